@@ -1,0 +1,2 @@
+//! Dualight.
+#![deny(unsafe_code)]
