@@ -1,0 +1,45 @@
+//! `perspective`: a pinhole.
+
+use super::{Camera, CameraDesc, CameraEntry};
+use crate::math::{DMat3, DVec3};
+
+struct Perspective {
+    origin: DVec3,
+    /// Columns: right and up scaled by the half sizes of the image at distance one, and forward.
+    basis: DMat3,
+}
+
+impl Camera for Perspective {
+    #[inline]
+    fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
+        let d = self.basis * DVec3::new(2.0 * x - 1.0, 1.0 - 2.0 * y, 1.0);
+        (self.origin, d.normalize())
+    }
+}
+
+fn build(d: &CameraDesc, aspect: f64) -> Result<Box<dyn Camera>, String> {
+    if !(d.vertical > 0.0 && d.vertical < std::f64::consts::PI) {
+        return Err(format!("yfov {} is not between 0 and π", d.vertical));
+    }
+    let m = d.world_from_camera.matrix3;
+    let axis = |v: DVec3| {
+        v.try_normalize()
+            .ok_or("its node has a scale of zero".to_string())
+    };
+    let h = (0.5 * d.vertical).tan();
+    Ok(Box::new(Perspective {
+        origin: d.world_from_camera.translation,
+        basis: DMat3::from_cols(
+            axis(m.x_axis)? * (h * aspect),
+            axis(m.y_axis)? * h,
+            -axis(m.z_axis)?,
+        ),
+    }))
+}
+
+/// The registry's line.
+pub(super) const ENTRY: CameraEntry = CameraEntry {
+    name: "perspective",
+    doc: "a pinhole camera",
+    build,
+};

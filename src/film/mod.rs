@@ -1,0 +1,279 @@
+//! The film: what pixels have gathered, as named layers. Knows radiance, nothing of scenes.
+
+mod layer;
+
+pub use layer::{Channel, Image, Layer};
+
+use crate::color::Rgb;
+use crate::math::DVec3;
+
+/// The parts of the radiance of a pixel; their sum is the beauty image.
+///
+/// A path is written from the camera E to the light L with D for a diffuse and S for any other
+/// scattering.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Component {
+    /// `E L` and `E D L`: what a light shows of itself, and lights directly.
+    Direct,
+    /// `E S …`: everything seen in mirrors and through glass.
+    Specular,
+    /// `E D S⁺ L`: light focused onto a diffuse surface.
+    Caustics,
+    /// `E D S* D …`: light that comes by way of another diffuse surface.
+    Indirect,
+}
+
+impl Component {
+    /// All of them, in the order of their indices.
+    pub const ALL: [Self; 4] = [Self::Direct, Self::Specular, Self::Caustics, Self::Indirect];
+
+    /// The layer's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Specular => "specular",
+            Self::Caustics => "caustics",
+            Self::Indirect => "indirect",
+        }
+    }
+}
+
+/// What one camera sample, or the mean of several, brought.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PixelSample {
+    /// Radiance by [`Component`], W/(m²·sr).
+    pub radiance: [Rgb; 4],
+    /// Share of samples that hit something.
+    pub alpha: f64,
+    /// Albedo of what is seen first.
+    pub albedo: Rgb,
+    /// Shading normal of what is seen first, world space.
+    pub normal: DVec3,
+    /// Position of what is seen first, in the file's coordinates.
+    pub position: DVec3,
+    /// Distance along the viewing ray in metres.
+    pub depth: f64,
+    /// Photons per square metre at the first diffuse surface: global, caustic.
+    pub photons: [f64; 2],
+}
+
+impl PixelSample {
+    /// Adds radiance to a component.
+    #[inline]
+    pub fn add(&mut self, component: Component, radiance: Rgb) {
+        self.radiance[component as usize] += radiance;
+    }
+
+    /// Sum over the components.
+    pub fn beauty(&self) -> Rgb {
+        self.radiance.iter().copied().sum()
+    }
+
+    fn values(&self) -> [f32; VALUES] {
+        let mut out = [0.0; VALUES];
+        for (c, rgb) in self.radiance.iter().enumerate() {
+            out[3 * c..3 * c + 3].copy_from_slice(&rgb.to_f32());
+        }
+        out[12..15].copy_from_slice(&self.albedo.to_f32());
+        out[15..18].copy_from_slice(&self.normal.as_vec3().to_array());
+        out[18..21].copy_from_slice(&self.position.as_vec3().to_array());
+        out[21] = self.depth as f32;
+        out[22] = self.photons[0] as f32;
+        out[23] = self.photons[1] as f32;
+        out[24] = self.alpha as f32;
+        out
+    }
+}
+
+const VALUES: usize = 25;
+
+/// A rectangle of pixels and the sums over the samples that one pass took there.
+#[derive(Clone, Debug)]
+pub struct Tile {
+    /// Left edge in pixels.
+    pub x: u32,
+    /// Upper edge in pixels.
+    pub y: u32,
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Sum of the samples of each pixel, row by row.
+    pub sums: Vec<PixelSample>,
+    /// Samples taken in each pixel.
+    pub samples: u32,
+}
+
+/// Sums of samples per pixel.
+#[derive(Clone, Debug)]
+pub struct Film {
+    width: u32,
+    height: u32,
+    sums: Vec<[f32; VALUES]>,
+    counts: Vec<u32>,
+    rejected: u64,
+}
+
+impl Film {
+    /// A black film.
+    pub fn new(width: u32, height: u32) -> Self {
+        let n = width as usize * height as usize;
+        Self {
+            width,
+            height,
+            sums: vec![[0.0; VALUES]; n],
+            counts: vec![0; n],
+            rejected: 0,
+        }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Pixels whose tile sum was not finite and was left out: a bug if ever above zero.
+    pub fn rejected(&self) -> u64 {
+        self.rejected
+    }
+
+    /// Adds the samples of a tile.
+    pub fn add(&mut self, tile: &Tile) {
+        for (k, sum) in tile.sums.iter().enumerate() {
+            let (dx, dy) = (k as u32 % tile.width, k as u32 / tile.width);
+            let i = (tile.y + dy) as usize * self.width as usize + (tile.x + dx) as usize;
+            let values = sum.values();
+            if values.iter().all(|v| v.is_finite()) {
+                for (a, v) in self.sums[i].iter_mut().zip(values) {
+                    *a += v;
+                }
+                self.counts[i] += tile.samples;
+            } else {
+                self.rejected += 1;
+            }
+        }
+    }
+
+    /// Smallest and largest number of samples of a pixel.
+    pub fn sample_range(&self) -> (u32, u32) {
+        let lo = self.counts.iter().copied().min().unwrap_or(0);
+        (lo, self.counts.iter().copied().max().unwrap_or(0))
+    }
+
+    /// The developed image: means per pixel, as layers.
+    pub fn develop(&self) -> Image {
+        let channel = |name: &str, half: bool, f: &dyn Fn(&[f32; VALUES]) -> f32| Channel {
+            name: name.into(),
+            half,
+            data: self
+                .sums
+                .iter()
+                .zip(&self.counts)
+                .map(|(s, &n)| if n == 0 { 0.0 } else { f(s) / n as f32 })
+                .collect(),
+        };
+        let rgb = |name: &str, f: &dyn Fn(&[f32; VALUES], usize) -> f32| Layer {
+            name: name.into(),
+            channels: ["R", "G", "B"]
+                .iter()
+                .enumerate()
+                .map(|(c, n)| channel(n, true, &|s| f(s, c)))
+                .collect(),
+        };
+        let mut beauty = rgb("", &|s, c| s[c] + s[3 + c] + s[6 + c] + s[9 + c]);
+        beauty.channels.push(channel("A", true, &|s| s[24]));
+        let mut layers = vec![beauty];
+        for (k, component) in Component::ALL.into_iter().enumerate() {
+            layers.push(rgb(component.name(), &|s, c| s[3 * k + c]));
+        }
+        layers.push(rgb("albedo", &|s, c| s[12 + c]));
+        let xyz = |name: &str, at: usize| Layer {
+            name: name.into(),
+            channels: ["X", "Y", "Z"]
+                .iter()
+                .enumerate()
+                .map(|(c, n)| channel(n, false, &|s| s[at + c]))
+                .collect(),
+        };
+        layers.push(xyz("N", 15));
+        layers.push(xyz("P", 18));
+        layers.push(Layer {
+            name: String::new(),
+            channels: vec![channel("Z", false, &|s| s[21])],
+        });
+        layers.push(Layer {
+            name: "photons".into(),
+            channels: vec![
+                channel("global", false, &|s| s[22]),
+                channel("caustic", false, &|s| s[23]),
+            ],
+        });
+        Image {
+            width: self.width,
+            height: self.height,
+            layers,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_add_up_to_means_and_components_to_the_beauty() {
+        let mut film = Film::new(3, 2);
+        let mut s = PixelSample {
+            alpha: 2.0,
+            ..Default::default()
+        };
+        s.add(Component::Direct, Rgb::new(2.0, 4.0, 6.0));
+        s.add(Component::Caustics, Rgb::splat(2.0));
+        film.add(&Tile {
+            x: 1,
+            y: 1,
+            width: 2,
+            height: 1,
+            sums: vec![s, s],
+            samples: 2,
+        });
+        assert_eq!(film.sample_range(), (0, 2));
+        let image = film.develop();
+        assert_eq!(
+            image.rgb(""),
+            Some(
+                [
+                    [0.0; 3],
+                    [0.0; 3],
+                    [0.0; 3],
+                    [0.0; 3],
+                    [2.0, 3.0, 4.0],
+                    [2.0, 3.0, 4.0]
+                ]
+                .to_vec()
+            )
+        );
+        assert_eq!(image.rgb("caustics").map(|v| v[4]), Some([1.0; 3]));
+    }
+
+    #[test]
+    fn a_sum_that_is_not_finite_is_left_out_and_counted() {
+        let mut film = Film::new(1, 1);
+        let mut s = PixelSample::default();
+        s.add(Component::Direct, Rgb::splat(f64::NAN));
+        film.add(&Tile {
+            x: 0,
+            y: 0,
+            width: 1,
+            height: 1,
+            sums: vec![s],
+            samples: 1,
+        });
+        assert_eq!((film.rejected(), film.sample_range()), (1, (0, 0)));
+    }
+}

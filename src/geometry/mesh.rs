@@ -1,0 +1,149 @@
+//! Indexed triangle meshes.
+
+use crate::math::{Aabb, DVec3, Vec3};
+
+/// How many primitives were dropped, and why.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Invalid {
+    /// An index outside the vertices.
+    pub index: usize,
+    /// A coordinate or radius that is NaN, infinite or beyond ±1e18.
+    pub coordinate: usize,
+    /// No area, or a radius that is not positive.
+    pub degenerate: usize,
+}
+
+impl Invalid {
+    /// All of them.
+    pub fn total(&self) -> usize {
+        self.index + self.coordinate + self.degenerate
+    }
+}
+
+/// Largest coordinate a backend can hold (Embree drops primitives beyond 1.844e18 silently).
+pub(super) const COORDINATE_LIMIT: f32 = 1e18;
+
+/// An indexed triangle mesh in its own (object) space.
+#[derive(Clone, Debug, Default)]
+pub struct TriangleMesh {
+    /// Vertex positions.
+    pub positions: Vec<[f32; 3]>,
+    /// Vertex indices of each triangle; counter-clockwise seen from the front.
+    pub indices: Vec<[u32; 3]>,
+    /// Shading normals per vertex; empty for flat shading.
+    pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates per vertex; may be empty.
+    pub uvs: Vec<[f32; 2]>,
+}
+
+impl TriangleMesh {
+    /// Drops triangles that no backend can hold or that have no area, and says how many.
+    pub fn drop_invalid(&mut self) -> Invalid {
+        let mut dropped = Invalid::default();
+        let positions = &self.positions;
+        self.indices.retain(|tri| {
+            let Some(v) = corners(positions, *tri) else {
+                dropped.index += 1;
+                return false;
+            };
+            if v.iter()
+                .any(|p| p.iter().any(|c| !(c.abs() <= COORDINATE_LIMIT)))
+            {
+                dropped.coordinate += 1;
+                return false;
+            }
+            let [a, b, c] = v.map(|p| Vec3::from(p).as_dvec3());
+            if (b - a).cross(c - a) == DVec3::ZERO {
+                dropped.degenerate += 1;
+                return false;
+            }
+            true
+        });
+        dropped
+    }
+
+    /// Corner positions of triangle `prim`.
+    #[inline]
+    pub fn corners(&self, prim: u32) -> [DVec3; 3] {
+        self.indices[prim as usize].map(|i| Vec3::from(self.positions[i as usize]).as_dvec3())
+    }
+
+    /// Interpolated shading normal, object space, not normalised; `None` for a flat mesh.
+    #[inline]
+    pub fn normal(&self, prim: u32, b1: f64, b2: f64) -> Option<DVec3> {
+        if self.normals.is_empty() {
+            return None;
+        }
+        let [a, b, c] =
+            self.indices[prim as usize].map(|i| Vec3::from(self.normals[i as usize]).as_dvec3());
+        Some(a * (1.0 - b1 - b2) + b * b1 + c * b2)
+    }
+
+    /// Interpolated texture coordinates; zero if the mesh has none.
+    #[inline]
+    pub fn uv(&self, prim: u32, b1: f64, b2: f64) -> [f64; 2] {
+        if self.uvs.is_empty() {
+            return [0.0; 2];
+        }
+        let [a, b, c] = self.indices[prim as usize].map(|i| self.uvs[i as usize]);
+        let mix = |k: usize| {
+            f64::from(a[k]) * (1.0 - b1 - b2) + f64::from(b[k]) * b1 + f64::from(c[k]) * b2
+        };
+        [mix(0), mix(1)]
+    }
+
+    /// Box around the vertices that triangles use.
+    pub fn bounds(&self) -> Aabb {
+        let mut b = Aabb::EMPTY;
+        for tri in &self.indices {
+            for &i in tri {
+                b.grow(Vec3::from(self.positions[i as usize]).as_dvec3());
+            }
+        }
+        b
+    }
+}
+
+fn corners(positions: &[[f32; 3]], tri: [u32; 3]) -> Option<[[f32; 3]; 3]> {
+    let at = |i: u32| positions.get(i as usize).copied();
+    Some([at(tri[0])?, at(tri[1])?, at(tri[2])?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn invalid_triangles_are_dropped_and_counted_and_the_rest_stays() {
+        let mut mesh = TriangleMesh {
+            positions: vec![
+                [0.0, 0.0, 0.0],
+                [1.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [f32::NAN, 0.0, 0.0],
+                [2e18, 0.0, 0.0],
+                [2.0, 0.0, 0.0],
+            ],
+            indices: vec![
+                [0, 1, 2],
+                [0, 1, 9],
+                [0, 1, 3],
+                [0, 2, 4],
+                [0, 1, 5],
+                [0, 0, 1],
+            ],
+            ..Default::default()
+        };
+        let dropped = mesh.drop_invalid();
+        assert_eq!(
+            dropped,
+            Invalid {
+                index: 1,
+                coordinate: 2,
+                degenerate: 2
+            }
+        );
+        assert_eq!(dropped.total(), 5);
+        assert_eq!(mesh.indices, [[0, 1, 2]]);
+    }
+}

@@ -1,0 +1,19 @@
+//! Primitives: triangle meshes and analytic spheres, their intersections written once over
+//! [`Real`](crate::ad::Real), and the surface point a hit refines to.
+//!
+//! A ray tracing backend says *which* primitive a ray hits and roughly where; [`SurfacePoint`]
+//! is then recomputed in `f64` on that one primitive, by the same code for every backend.
+
+mod hit;
+mod mesh;
+mod object;
+mod ray;
+pub mod sphere;
+mod surface_point;
+pub mod triangle;
+
+pub use hit::Hit;
+pub use mesh::{Invalid, TriangleMesh};
+pub use object::{Geometry, Object, Placement, Shape, SphereSet};
+pub use ray::Ray;
+pub use surface_point::{LightId, MaterialId, ObjectId, ShapeId, SurfacePoint};

@@ -1,0 +1,188 @@
+//! The neutral description of a scene's geometry: all that a ray tracing backend sees.
+
+use std::sync::Arc;
+
+use super::mesh::COORDINATE_LIMIT;
+use super::{
+    Hit, Invalid, LightId, MaterialId, ObjectId, Ray, ShapeId, SurfacePoint, TriangleMesh,
+};
+use crate::math::{Aabb, DAffine3, DVec3, Vec3};
+
+/// Analytic spheres in their own (object) space.
+#[derive(Clone, Debug, Default)]
+pub struct SphereSet {
+    /// Centre and radius of each sphere.
+    pub spheres: Vec<[f32; 4]>,
+}
+
+impl SphereSet {
+    /// Drops spheres that no backend can hold or that have no positive radius.
+    pub fn drop_invalid(&mut self) -> Invalid {
+        let mut dropped = Invalid::default();
+        self.spheres.retain(|s| {
+            if s.iter().any(|c| !(c.abs() <= COORDINATE_LIMIT)) {
+                dropped.coordinate += 1;
+                false
+            } else if s[3] <= f32::MIN_POSITIVE {
+                dropped.degenerate += 1;
+                false
+            } else {
+                true
+            }
+        });
+        dropped
+    }
+
+    /// Centre and radius of sphere `prim`.
+    #[inline]
+    pub fn get(&self, prim: u32) -> (DVec3, f64) {
+        let [x, y, z, r] = self.spheres[prim as usize];
+        (Vec3::new(x, y, z).as_dvec3(), f64::from(r))
+    }
+
+    /// Box around all spheres.
+    pub fn bounds(&self) -> Aabb {
+        (0..self.spheres.len()).fold(Aabb::EMPTY, |b, i| {
+            let (c, r) = self.get(i as u32);
+            b.union(Aabb {
+                min: c - r,
+                max: c + r,
+            })
+        })
+    }
+}
+
+/// Geometry of one material, in its own space, shared by all objects that place it.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// Triangles.
+    Mesh(TriangleMesh),
+    /// Analytic spheres.
+    Spheres(SphereSet),
+}
+
+impl Shape {
+    /// Number of primitives.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Mesh(m) => m.indices.len(),
+            Self::Spheres(s) => s.spheres.len(),
+        }
+    }
+
+    /// Whether it has no primitive.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Box around it, in its own space.
+    pub fn bounds(&self) -> Aabb {
+        match self {
+            Self::Mesh(m) => m.bounds(),
+            Self::Spheres(s) => s.bounds(),
+        }
+    }
+}
+
+/// A shape placed in the world, with its material.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// What is placed.
+    pub shape: ShapeId,
+    /// World from object space; `None` if the shape is given in world space already, as it is
+    /// for everything that is placed once.
+    pub placement: Option<Placement>,
+    /// Its material.
+    pub material: MaterialId,
+    /// The light it is, if it emits.
+    pub light: Option<LightId>,
+    /// Name of the node it came from.
+    pub name: Arc<str>,
+}
+
+/// An affine placement with what queries need of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Placement {
+    /// World from object space, rounded to single precision so that all backends use the same.
+    pub world_from_object: DAffine3,
+    /// Its inverse.
+    pub object_from_world: DAffine3,
+}
+
+impl Placement {
+    /// The placement by `world_from_object`; `None` if it is singular or not finite.
+    pub fn new(world_from_object: DAffine3) -> Option<Self> {
+        let round = |v: DVec3| v.as_vec3().as_dvec3();
+        let m = world_from_object.matrix3;
+        let rounded = DAffine3 {
+            matrix3: glam::DMat3::from_cols(round(m.x_axis), round(m.y_axis), round(m.z_axis)),
+            translation: round(world_from_object.translation),
+        };
+        let det = rounded.matrix3.determinant();
+        let inverse = rounded.inverse();
+        (rounded.is_finite() && det != 0.0 && inverse.is_finite()).then_some(Self {
+            world_from_object: rounded,
+            object_from_world: inverse,
+        })
+    }
+}
+
+/// Shapes and the objects that place them; frozen after import.
+#[derive(Clone, Debug, Default)]
+pub struct Geometry {
+    /// All shapes.
+    pub shapes: Vec<Shape>,
+    /// All objects; a [`Hit`] names one.
+    pub objects: Vec<Object>,
+}
+
+impl Geometry {
+    /// The object named `id`.
+    #[inline]
+    pub fn object(&self, id: ObjectId) -> &Object {
+        &self.objects[id.0 as usize]
+    }
+
+    /// The shape named `id`.
+    #[inline]
+    pub fn shape(&self, id: ShapeId) -> &Shape {
+        &self.shapes[id.0 as usize]
+    }
+
+    /// World-space box of an object.
+    pub fn object_bounds(&self, id: ObjectId) -> Aabb {
+        let object = self.object(id);
+        let b = self.shape(object.shape).bounds();
+        let Some(place) = &object.placement else {
+            return b;
+        };
+        if b.is_empty() {
+            return b;
+        }
+        let mut out = Aabb::EMPTY;
+        for k in 0..8 {
+            let pick = |bit: usize, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
+            let corner = DVec3::new(
+                pick(0, b.min.x, b.max.x),
+                pick(1, b.min.y, b.max.y),
+                pick(2, b.min.z, b.max.z),
+            );
+            out.grow(place.world_from_object.transform_point3(corner));
+        }
+        out
+    }
+
+    /// World-space box of everything.
+    pub fn bounds(&self) -> Aabb {
+        (0..self.objects.len()).fold(Aabb::EMPTY, |b, i| {
+            b.union(self.object_bounds(ObjectId(i as u32)))
+        })
+    }
+
+    /// Refines a hit: recomputes everything about it in `f64` on the primitive it names.
+    #[inline]
+    pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let object = self.object(hit.object);
+        SurfacePoint::refine(ray, hit, object, self.shape(object.shape))
+    }
+}

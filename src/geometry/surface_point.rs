@@ -1,0 +1,215 @@
+//! What shading knows about a hit.
+
+use super::object::Placement;
+use super::{Hit, Object, Ray, Shape, sphere, triangle};
+use crate::ad::V3;
+use crate::math::{DVec3, robust};
+
+macro_rules! id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(pub u32);
+
+        impl $name {
+            /// As an index into its arena.
+            #[inline]
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+    };
+}
+
+id!(/// Names a shape.
+    ShapeId);
+id!(/// Names an object.
+    ObjectId);
+id!(/// Names a material.
+    MaterialId);
+id!(/// Names a light.
+    LightId);
+
+/// A point on a surface, computed in `f64` on the primitive that was hit. World space.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Position, on the primitive.
+    pub p: DVec3,
+    /// Unit geometric normal, out of the front (outside of a sphere).
+    pub ng: DVec3,
+    /// Unit shading normal, in the hemisphere of `ng`.
+    pub n: DVec3,
+    /// Unit direction back along the ray.
+    pub wo: DVec3,
+    /// Whether the ray came from the front: `wo · ng > 0`.
+    pub front: bool,
+    /// Distance from the ray's origin in metres.
+    pub distance: f64,
+    /// Texture coordinates.
+    pub uv: [f64; 2],
+    /// How far from the surface spawned rays start, in metres.
+    pub offset: f64,
+    /// Triangle or sphere within the shape.
+    pub prim: u32,
+    /// The object hit.
+    pub object: ObjectId,
+    /// Its material.
+    pub material: super::MaterialId,
+    /// The light it is, if any.
+    pub light: Option<LightId>,
+}
+
+impl SurfacePoint {
+    /// Recomputes a hit on its primitive.
+    #[inline]
+    pub(super) fn refine(ray: &Ray, hit: &Hit, object: &Object, shape: &Shape) -> Self {
+        let (o, d) = (ray.origin(), ray.direction());
+        let on = match &object.placement {
+            None => refine_local(o, d, f64::from(hit.t), hit.prim, shape, None),
+            Some(place) => {
+                // The affine map keeps t; the point goes back through the exact placement.
+                let inv = &place.object_from_world;
+                let (lo, ld) = (inv.transform_point3(o), inv.transform_vector3(d));
+                let mut on = refine_local(lo, ld, f64::from(hit.t), hit.prim, shape, Some(place));
+                let p = place.world_from_object.transform_point3(on.p);
+                let cofactor = inv.matrix3.transpose();
+                // By the inverse transpose an outward normal stays outward, also when the map
+                // mirrors: that is the flip of the winding which glTF 2.0, 3.7.4 asks for.
+                on.ng = (cofactor * on.ng).normalize();
+                on.n = (cofactor * on.n).normalize();
+                on.p = p;
+                on
+            }
+        };
+        let wo = -d.normalize();
+        Self {
+            p: on.p,
+            ng: on.ng,
+            n: if on.n.dot(on.ng) < 0.0 { -on.n } else { on.n },
+            wo,
+            front: wo.dot(on.ng) > 0.0,
+            distance: (on.p - o).length(),
+            uv: on.uv,
+            offset: robust::spawn_offset(on.p, on.center, on.size),
+            prim: hit.prim,
+            object: hit.object,
+            material: object.material,
+            light: object.light,
+        }
+    }
+
+    /// The ray from here along `d` (any length), started outside the rounding error on the side
+    /// `d` points to. Numerically this never hits the primitive it leaves.
+    #[inline]
+    pub fn spawn(&self, d: DVec3) -> Ray {
+        Ray::new(self.offset_toward(d), d)
+    }
+
+    /// The segment from here to `target`, a point already offset from its own surface.
+    #[inline]
+    pub fn spawn_to(&self, target: DVec3) -> Ray {
+        Ray::segment(self.offset_toward(target - self.p), target)
+    }
+
+    /// The position, moved off the surface to the side that `d` points to.
+    #[inline]
+    pub fn offset_toward(&self, d: DVec3) -> DVec3 {
+        let side = if d.dot(self.ng) >= 0.0 {
+            self.offset
+        } else {
+            -self.offset
+        };
+        self.p + self.ng * side
+    }
+}
+
+/// A refined point in the space of the shape.
+struct Refined {
+    p: DVec3,
+    ng: DVec3,
+    n: DVec3,
+    uv: [f64; 2],
+    center: DVec3,
+    size: f64,
+}
+
+#[inline]
+fn refine_local(
+    o: DVec3,
+    d: DVec3,
+    t: f64,
+    prim: u32,
+    shape: &Shape,
+    place: Option<&Placement>,
+) -> Refined {
+    match shape {
+        Shape::Mesh(mesh) => {
+            let v = mesh.corners(prim);
+            // A backend may report a hit an ulp outside, or on a triangle seen edge-on:
+            // the point is kept on the triangle.
+            let (b1, b2) = match triangle::plane_hit(V3::<f64>::constant(o), V3::constant(d), v) {
+                Some(h) => clamp_barycentrics(h.b1, h.b2),
+                None => (1.0 / 3.0, 1.0 / 3.0),
+            };
+            let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
+            let ng = e1.cross(e2).normalize();
+            let n = mesh
+                .normal(prim, b1, b2)
+                .and_then(DVec3::try_normalize)
+                .unwrap_or(ng);
+            let (center, size) = local_scale(place);
+            Refined {
+                p: v[0] + e1 * b1 + e2 * b2,
+                ng,
+                n,
+                uv: mesh.uv(prim, b1, b2),
+                center,
+                size,
+            }
+        }
+        Shape::Spheres(set) => {
+            let (c, r) = set.get(prim);
+            let line = sphere::line_sphere(V3::<f64>::constant(o), V3::constant(d), c, r);
+            let t = match line.roots() {
+                Some([t0, t1]) => {
+                    if (t - t0).abs() <= (t - t1).abs() {
+                        t0
+                    } else {
+                        t1
+                    }
+                }
+                // The backend saw a graze that exact arithmetic misses: the closest point serves.
+                None => line.t_closest,
+            };
+            let n = (o + d * t - c).try_normalize().unwrap_or(DVec3::Z);
+            let (center, size) = local_scale(place);
+            Refined {
+                p: c + n * r,
+                ng: n,
+                n,
+                uv: [0.0; 2],
+                center: if place.is_some() { center } else { c },
+                size: size + r * place.map_or(1.0, |p| p.world_from_object.matrix3.x_axis.length()),
+            }
+        }
+    }
+}
+
+/// What the rounding of an instance's transform scales with: its translation.
+#[inline]
+fn local_scale(place: Option<&Placement>) -> (DVec3, f64) {
+    place.map_or((DVec3::ZERO, 0.0), |p| {
+        (p.world_from_object.translation, 0.0)
+    })
+}
+
+#[inline]
+fn clamp_barycentrics(b1: f64, b2: f64) -> (f64, f64) {
+    let (b1, b2) = (b1.max(0.0), b2.max(0.0));
+    let sum = b1 + b2;
+    if sum > 1.0 {
+        (b1 / sum, b2 / sum)
+    } else {
+        (b1, b2)
+    }
+}

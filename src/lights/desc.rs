@@ -1,0 +1,53 @@
+//! What a light is made from.
+
+use crate::color::Rgb;
+use crate::math::{BoundingSphere, DVec3};
+
+/// Parameters of a light, world space, radiometric units. A kind reads what it needs.
+#[derive(Clone, Debug)]
+pub struct LightDesc {
+    /// A name of [`LIGHTS`](super::LIGHTS).
+    pub kind: &'static str,
+    /// Name of the node, for messages.
+    pub name: String,
+    /// Position of point and spot lights.
+    pub position: DVec3,
+    /// Unit direction in which spot and directional lights shine.
+    pub direction: DVec3,
+    /// Radiance of surfaces, intensity (W/sr) of points and spots, irradiance (W/m²) of parallel
+    /// light.
+    pub strength: Rgb,
+    /// Spot: half angle in radians within which intensity is full.
+    pub inner_cone: f64,
+    /// Spot: half angle in radians beyond which there is none.
+    pub outer_cone: f64,
+    /// Area: corners of the triangles, front counter-clockwise; indexed as the mesh is.
+    pub triangles: Vec<[DVec3; 3]>,
+    /// Sphere: centre and radius of each sphere; indexed as the set is.
+    pub spheres: Vec<BoundingSphere>,
+    /// Area: whether the back emits too.
+    pub double_sided: bool,
+    /// Parallel light: what it has to cover.
+    pub scene: BoundingSphere,
+}
+
+impl Default for LightDesc {
+    fn default() -> Self {
+        Self {
+            kind: "point",
+            name: String::new(),
+            position: DVec3::ZERO,
+            direction: DVec3::NEG_Z,
+            strength: Rgb::ONE,
+            inner_cone: 0.0,
+            outer_cone: std::f64::consts::FRAC_PI_4,
+            triangles: Vec::new(),
+            spheres: Vec::new(),
+            double_sided: false,
+            scene: BoundingSphere {
+                center: DVec3::ZERO,
+                radius: 0.0,
+            },
+        }
+    }
+}

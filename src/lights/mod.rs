@@ -1,0 +1,120 @@
+//! Lights: what they emit, how to sample them from a point, how photons leave them. They answer
+//! questions, trace no rays and never see the scene. A light kind is one file and one line in
+//! [`LIGHTS`].
+//!
+//! Units: flux W, intensity W/sr, irradiance W/m², radiance W/(m²·sr), each per RGB channel.
+
+mod area;
+mod desc;
+mod directional;
+mod point;
+mod sphere;
+mod spot;
+
+pub use desc::LightDesc;
+
+use crate::color::Rgb;
+use crate::geometry::{Ray, SurfacePoint};
+use crate::math::DVec3;
+
+/// A sample of the light that arrives at a point.
+#[derive(Clone, Copy, Debug)]
+pub struct LiSample {
+    /// Unit direction from the point to the light.
+    pub wi: DVec3,
+    /// Where on the light, moved off its surface; `None` for light from infinity.
+    pub target: Option<DVec3>,
+    /// Radiance; for a delta light the incident irradiance at normal incidence.
+    pub radiance: Rgb,
+    /// Density in solid angle at the point; 1 for a delta light.
+    pub pdf: f64,
+    /// Whether no other technique can find this light.
+    pub delta: bool,
+}
+
+/// Where a photon leaves a light.
+#[derive(Clone, Copy, Debug)]
+pub struct EmissionOrigin {
+    /// Position on the light.
+    pub p: DVec3,
+    /// Unit normal of a surface that emits; `None` for a point.
+    pub ng: Option<DVec3>,
+    /// Start of rays off the surface, in metres along `ng`.
+    pub offset: f64,
+    /// Density in area (1/m²); 1 for a point.
+    pub pdf_area: f64,
+}
+
+impl EmissionOrigin {
+    /// The ray that leaves along `dir`.
+    #[inline]
+    pub fn ray(&self, dir: DVec3) -> Ray {
+        let shift = self
+            .ng
+            .map_or(DVec3::ZERO, |n| n * self.offset.copysign(n.dot(dir)));
+        Ray::new(self.p + shift, dir)
+    }
+}
+
+/// Parallel light.
+#[derive(Clone, Copy, Debug)]
+pub struct Distant {
+    /// Unit direction in which the light travels.
+    pub direction: DVec3,
+    /// Irradiance on a surface at normal incidence, W/m².
+    pub irradiance: Rgb,
+}
+
+/// A light source.
+pub trait Light: Send + Sync {
+    /// Emitted flux in W; for parallel light that through the scene's disc.
+    fn power(&self) -> Rgb;
+
+    /// Samples the light that arrives at `p`; `None` where none can.
+    fn sample_li(&self, p: DVec3, u: [f64; 2]) -> Option<LiSample>;
+
+    /// Density in solid angle, seen from `p`, with which [`sample_li`](Self::sample_li) finds
+    /// the point `on` of this light; 0 for delta lights.
+    fn pdf_li(&self, p: DVec3, on: &SurfacePoint) -> f64;
+
+    /// Radiance emitted at a point of this light toward `on.wo`.
+    fn radiance(&self, on: &SurfacePoint) -> Rgb;
+
+    /// Parallel light, if that is what it is: photons then leave a disc beside the scene, all in
+    /// one direction.
+    fn distant(&self) -> Option<Distant> {
+        None
+    }
+
+    /// A point where photons leave.
+    fn sample_origin(&self, u: [f64; 2]) -> Option<EmissionOrigin>;
+
+    /// A direction in which photons leave `from`, and its density in solid angle.
+    fn sample_direction(&self, from: &EmissionOrigin, u: [f64; 2]) -> (DVec3, f64);
+
+    /// What leaves `from` along the unit direction `dir`: radiance times cosine in W/(m²·sr) for
+    /// a surface, intensity in W/sr for a point.
+    fn emitted(&self, from: &EmissionOrigin, dir: DVec3) -> Rgb;
+}
+
+/// A light kind that can be chosen.
+#[derive(Clone, Copy, Debug)]
+pub struct LightEntry {
+    /// Name, as [`LightDesc::kind`] gives it.
+    pub name: &'static str,
+    /// One sentence.
+    pub doc: &'static str,
+    /// Makes the light; the error says what is wrong.
+    pub build: fn(&LightDesc) -> Result<Box<dyn Light>, String>,
+}
+
+crate::registry::impl_entry!(LightEntry, "light");
+
+/// The light kinds.
+pub static LIGHTS: &[LightEntry] = &[
+    area::ENTRY,
+    sphere::ENTRY,
+    point::ENTRY,
+    spot::ENTRY,
+    directional::ENTRY,
+];

@@ -1,0 +1,82 @@
+//! `point`: the same intensity in every direction.
+
+use std::f64::consts::PI;
+
+use super::{EmissionOrigin, LiSample, Light, LightEntry};
+use crate::color::Rgb;
+use crate::geometry::SurfacePoint;
+use crate::math::DVec3;
+use crate::sampling::warp;
+
+struct PointLight {
+    position: DVec3,
+    intensity: Rgb,
+}
+
+/// The direct sample of a light without extent of the given intensity toward `p`.
+pub(super) fn sample_point(position: DVec3, p: DVec3, intensity: Rgb) -> Option<LiSample> {
+    let to = position - p;
+    let d2 = to.length_squared();
+    if !(d2 > 0.0) || intensity.is_black() {
+        return None;
+    }
+    Some(LiSample {
+        wi: to / d2.sqrt(),
+        target: Some(position),
+        radiance: intensity / d2,
+        pdf: 1.0,
+        delta: true,
+    })
+}
+
+/// The origin of photons of a light without extent.
+pub(super) fn point_origin(p: DVec3) -> EmissionOrigin {
+    EmissionOrigin {
+        p,
+        ng: None,
+        offset: 0.0,
+        pdf_area: 1.0,
+    }
+}
+
+impl Light for PointLight {
+    fn power(&self) -> Rgb {
+        self.intensity * (4.0 * PI)
+    }
+
+    fn sample_li(&self, p: DVec3, _u: [f64; 2]) -> Option<LiSample> {
+        sample_point(self.position, p, self.intensity)
+    }
+
+    fn pdf_li(&self, _p: DVec3, _on: &SurfacePoint) -> f64 {
+        0.0
+    }
+
+    fn radiance(&self, _on: &SurfacePoint) -> Rgb {
+        Rgb::ZERO
+    }
+
+    fn sample_origin(&self, _u: [f64; 2]) -> Option<EmissionOrigin> {
+        Some(point_origin(self.position))
+    }
+
+    fn sample_direction(&self, _from: &EmissionOrigin, u: [f64; 2]) -> (DVec3, f64) {
+        (warp::sphere(u), 1.0 / (4.0 * PI))
+    }
+
+    fn emitted(&self, _from: &EmissionOrigin, _dir: DVec3) -> Rgb {
+        self.intensity
+    }
+}
+
+/// The registry's line.
+pub(super) const ENTRY: LightEntry = LightEntry {
+    name: "point",
+    doc: "a point that shines equally in every direction",
+    build: |d| {
+        Ok(Box::new(PointLight {
+            position: d.position,
+            intensity: d.strength,
+        }))
+    },
+};

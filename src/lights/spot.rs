@@ -1,0 +1,104 @@
+//! `spot`: a point with a cone, with the falloff that `KHR_lights_punctual` recommends.
+
+use std::f64::consts::PI;
+
+use super::point::{point_origin, sample_point};
+use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
+use crate::color::Rgb;
+use crate::geometry::SurfacePoint;
+use crate::math::{DVec3, Frame};
+use crate::sampling::warp;
+
+struct SpotLight {
+    position: DVec3,
+    frame: Frame,
+    intensity: Rgb,
+    cos_inner: f64,
+    cos_outer: f64,
+}
+
+impl SpotLight {
+    /// Relative intensity at the cosine of the angle to the axis.
+    #[inline]
+    fn falloff(&self, cos: f64) -> f64 {
+        if cos <= self.cos_outer {
+            return 0.0;
+        }
+        // A hard edge has no ramp to divide by.
+        let ramp = self.cos_inner - self.cos_outer;
+        let t = if ramp > 0.0 {
+            ((cos - self.cos_outer) / ramp).min(1.0)
+        } else {
+            1.0
+        };
+        t * t
+    }
+
+    #[inline]
+    fn toward(&self, dir: DVec3) -> Rgb {
+        self.intensity * self.falloff(dir.dot(self.frame.z))
+    }
+}
+
+impl Light for SpotLight {
+    fn power(&self) -> Rgb {
+        // ∫ falloff dω = 2π [(1 − cos_inner) + (cos_inner − cos_outer)/3].
+        let core = 1.0 - self.cos_inner;
+        let ramp = (self.cos_inner - self.cos_outer) / 3.0;
+        self.intensity * (2.0 * PI * (core + ramp))
+    }
+
+    fn sample_li(&self, p: DVec3, _u: [f64; 2]) -> Option<LiSample> {
+        let dir = (p - self.position).try_normalize()?;
+        sample_point(self.position, p, self.toward(dir))
+    }
+
+    fn pdf_li(&self, _p: DVec3, _on: &SurfacePoint) -> f64 {
+        0.0
+    }
+
+    fn radiance(&self, _on: &SurfacePoint) -> Rgb {
+        Rgb::ZERO
+    }
+
+    fn sample_origin(&self, _u: [f64; 2]) -> Option<EmissionOrigin> {
+        Some(point_origin(self.position))
+    }
+
+    fn sample_direction(&self, _from: &EmissionOrigin, u: [f64; 2]) -> (DVec3, f64) {
+        let complement = 1.0 - self.cos_outer;
+        let local = warp::cone_from_complement(u, complement);
+        (self.frame.to_world(local), warp::cone_pdf(complement))
+    }
+
+    fn emitted(&self, _from: &EmissionOrigin, dir: DVec3) -> Rgb {
+        self.toward(dir)
+    }
+}
+
+fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
+    let direction = d
+        .direction
+        .try_normalize()
+        .ok_or("its direction has no length")?;
+    if !(d.outer_cone > 0.0 && d.outer_cone <= PI && d.inner_cone >= 0.0) {
+        return Err(format!(
+            "cone angles {} and {} are not between 0 and π",
+            d.inner_cone, d.outer_cone
+        ));
+    }
+    Ok(Box::new(SpotLight {
+        position: d.position,
+        frame: Frame::from_normal(direction),
+        intensity: d.strength,
+        cos_inner: d.inner_cone.min(d.outer_cone).cos(),
+        cos_outer: d.outer_cone.cos(),
+    }))
+}
+
+/// The registry's line.
+pub(super) const ENTRY: LightEntry = LightEntry {
+    name: "spot",
+    doc: "a point that shines into a cone",
+    build,
+};

@@ -1,0 +1,45 @@
+//! `conductor`: a rough metal. In glTF: metallic 1, roughness above 0.
+
+use super::fresnel::Schlick;
+use super::lobes::GgxReflection;
+use super::{Bsdf, Material, MaterialDesc, MaterialEntry, MaterialTraits, TransportMode};
+use crate::geometry::SurfacePoint;
+
+struct Conductor {
+    lobe: GgxReflection,
+}
+
+impl Material for Conductor {
+    #[inline]
+    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
+        let mut bsdf = Bsdf::new(sp, mode);
+        bsdf.push(self.lobe);
+        bsdf
+    }
+
+    fn traits(&self) -> MaterialTraits {
+        MaterialTraits {
+            reflects: true,
+            ..Default::default()
+        }
+    }
+}
+
+fn build(d: &MaterialDesc) -> Result<Box<dyn Material>, String> {
+    let fresnel = Schlick {
+        f0: d.base_color,
+        f90: 1.0,
+    };
+    let alpha = d.roughness.max(MaterialDesc::SMOOTH).powi(2);
+    Ok(Box::new(Conductor {
+        lobe: GgxReflection::new(alpha, fresnel),
+    }))
+}
+
+/// The registry's line.
+pub(super) const ENTRY: MaterialEntry = MaterialEntry {
+    name: "conductor",
+    doc: "a rough metal: GGX with visible-normal sampling",
+    claims: |d| d.metallic == 1.0,
+    build,
+};

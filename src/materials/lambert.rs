@@ -1,0 +1,41 @@
+//! `lambert`: ideal diffuse reflection. In glTF: roughness 1, metallic 0 and
+//! `KHR_materials_specular` factor 0.
+
+use super::lobes::Lambert;
+use super::{Bsdf, Material, MaterialEntry, MaterialTraits, TransportMode};
+use crate::color::Rgb;
+use crate::geometry::SurfacePoint;
+
+struct LambertMaterial {
+    albedo: Rgb,
+}
+
+impl Material for LambertMaterial {
+    #[inline]
+    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
+        let mut bsdf = Bsdf::new(sp, mode);
+        bsdf.push(Lambert {
+            albedo: self.albedo,
+        });
+        bsdf
+    }
+
+    fn traits(&self) -> MaterialTraits {
+        MaterialTraits {
+            diffuse: self.albedo.max_channel(),
+            ..Default::default()
+        }
+    }
+}
+
+/// The registry's line.
+pub(super) const ENTRY: MaterialEntry = MaterialEntry {
+    name: "lambert",
+    doc: "ideal diffuse reflection",
+    claims: |d| d.metallic == 0.0 && d.transmission == 0.0 && d.specular == 0.0,
+    build: |d| {
+        Ok(Box::new(LambertMaterial {
+            albedo: d.base_color,
+        }))
+    },
+};

@@ -1,0 +1,146 @@
+//! Lobes: the elementary scattering functions that materials stack, one per file, one line each
+//! in the list below.
+//!
+//! A lobe works in the local frame: `z` is the shading normal on the side of `wo`, so
+//! `wo.z > 0` always; `wi.z < 0` means transmission.
+
+mod coated_lambert;
+mod ggx_dielectric;
+mod ggx_reflection;
+mod lambert;
+mod smooth_dielectric;
+mod smooth_reflection;
+mod thin_dielectric;
+
+use std::sync::Arc;
+
+pub use coated_lambert::CoatedLambert;
+pub use ggx_dielectric::GgxDielectric;
+pub use ggx_reflection::GgxReflection;
+pub use lambert::Lambert;
+pub use smooth_dielectric::SmoothDielectric;
+pub use smooth_reflection::SmoothReflection;
+pub use thin_dielectric::ThinDielectric;
+
+use crate::color::Rgb;
+use crate::math::DVec3;
+
+/// How a lobe is treated by photon maps and light sampling.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LobeClass {
+    /// Broad reflection; photons are stored here.
+    Diffuse,
+    /// Finite but directional; followed like a mirror, sampled from lights too.
+    Glossy,
+    /// A single direction.
+    Delta,
+}
+
+/// A direction sampled from one lobe, local frame.
+#[derive(Clone, Copy, Debug)]
+pub struct LobeSample {
+    /// Unit direction.
+    pub wi: DVec3,
+    /// `f·|cos θi| / pdf`.
+    pub weight: Rgb,
+    /// Density in solid angle; 0 for a delta lobe.
+    pub pdf: f64,
+}
+
+/// What every lobe answers.
+pub trait LobeModel {
+    /// Its class.
+    fn class(&self) -> LobeClass;
+    /// `f` (without cosine, importance convention) and density of [`sample`](Self::sample);
+    /// zero for a delta lobe.
+    fn eval(&self, wo: DVec3, wi: DVec3) -> (Rgb, f64);
+    /// A direction chosen by `u`; `u_pick` decides between branches (reflect or refract).
+    fn sample(&self, wo: DVec3, u_pick: f64, u: [f64; 2]) -> Option<LobeSample>;
+    /// Directional albedo, possibly approximate: used to pick lobes and for display.
+    fn albedo(&self, wo: DVec3) -> Rgb;
+    /// Index beyond the surface over index on the side of `wo`, for lobes that refract.
+    fn eta(&self) -> f64 {
+        1.0
+    }
+}
+
+/// A lobe defined outside this crate.
+pub type CustomLobe = Arc<dyn LobeModel + Send + Sync>;
+
+impl LobeModel for CustomLobe {
+    fn class(&self) -> LobeClass {
+        (**self).class()
+    }
+    fn eval(&self, wo: DVec3, wi: DVec3) -> (Rgb, f64) {
+        (**self).eval(wo, wi)
+    }
+    fn sample(&self, wo: DVec3, u_pick: f64, u: [f64; 2]) -> Option<LobeSample> {
+        (**self).sample(wo, u_pick, u)
+    }
+    fn albedo(&self, wo: DVec3) -> Rgb {
+        (**self).albedo(wo)
+    }
+    fn eta(&self) -> f64 {
+        (**self).eta()
+    }
+}
+
+macro_rules! lobes {
+    ($($name:ident($model:ty)),* $(,)?) => {
+        /// Any lobe; a closed set so that the inner loop needs no virtual call, with one open end.
+        #[derive(Clone)]
+        pub enum Lobe {
+            $(
+                #[allow(missing_docs, reason = "named after the model")]
+                $name($model),
+            )*
+        }
+
+        $(impl From<$model> for Lobe {
+            #[inline]
+            fn from(l: $model) -> Self {
+                Self::$name(l)
+            }
+        })*
+
+        impl LobeModel for Lobe {
+            #[inline]
+            fn class(&self) -> LobeClass {
+                match self { $(Self::$name(l) => l.class(),)* }
+            }
+            #[inline]
+            fn eval(&self, wo: DVec3, wi: DVec3) -> (Rgb, f64) {
+                match self { $(Self::$name(l) => l.eval(wo, wi),)* }
+            }
+            #[inline]
+            fn sample(&self, wo: DVec3, u_pick: f64, u: [f64; 2]) -> Option<LobeSample> {
+                match self { $(Self::$name(l) => l.sample(wo, u_pick, u),)* }
+            }
+            #[inline]
+            fn albedo(&self, wo: DVec3) -> Rgb {
+                match self { $(Self::$name(l) => l.albedo(wo),)* }
+            }
+            #[inline]
+            fn eta(&self) -> f64 {
+                match self { $(Self::$name(l) => l.eta(),)* }
+            }
+        }
+
+        impl std::fmt::Debug for Lobe {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(match self { $(Self::$name(_) => stringify!($name),)* })
+            }
+        }
+    };
+}
+
+lobes! {
+    Lambert(Lambert),
+    CoatedLambert(CoatedLambert),
+    SmoothReflection(SmoothReflection),
+    SmoothDielectric(SmoothDielectric),
+    ThinDielectric(ThinDielectric),
+    GgxReflection(GgxReflection),
+    GgxDielectric(GgxDielectric),
+    Custom(CustomLobe),
+}

@@ -1,0 +1,60 @@
+//! Reflection and refraction by a smooth interface.
+
+use super::{LobeClass, LobeModel, LobeSample};
+use crate::color::Rgb;
+use crate::materials::fresnel;
+use crate::math::DVec3;
+
+/// A smooth interface between two dielectrics, with exact Fresnel terms.
+#[derive(Clone, Copy, Debug)]
+pub struct SmoothDielectric {
+    /// Index beyond the surface over index on the side of `wo`.
+    pub eta: f64,
+    /// Colour of what is refracted.
+    pub tint: Rgb,
+    /// Share of what is not reflected that is refracted; the rest is left to other lobes.
+    pub transmission: f64,
+}
+
+impl LobeModel for SmoothDielectric {
+    #[inline]
+    fn class(&self) -> LobeClass {
+        LobeClass::Delta
+    }
+
+    #[inline]
+    fn eval(&self, _wo: DVec3, _wi: DVec3) -> (Rgb, f64) {
+        (Rgb::ZERO, 0.0)
+    }
+
+    #[inline]
+    fn sample(&self, wo: DVec3, u_pick: f64, _u: [f64; 2]) -> Option<LobeSample> {
+        let f = fresnel::dielectric(wo.z, self.eta);
+        let through = f.transmittance * self.transmission;
+        let p_reflect = f.reflectance / (f.reflectance + through);
+        if u_pick < p_reflect {
+            return Some(LobeSample {
+                wi: DVec3::new(-wo.x, -wo.y, wo.z),
+                weight: Rgb::splat(f.reflectance + through),
+                pdf: 0.0,
+            });
+        }
+        let inv = 1.0 / self.eta;
+        Some(LobeSample {
+            wi: DVec3::new(-wo.x * inv, -wo.y * inv, -f.cos_t).normalize(),
+            weight: self.tint * (f.reflectance + through),
+            pdf: 0.0,
+        })
+    }
+
+    #[inline]
+    fn albedo(&self, wo: DVec3) -> Rgb {
+        let f = fresnel::dielectric(wo.z, self.eta);
+        Rgb::splat(f.reflectance) + self.tint * (f.transmittance * self.transmission)
+    }
+
+    #[inline]
+    fn eta(&self) -> f64 {
+        self.eta
+    }
+}

@@ -1,0 +1,65 @@
+//! Thin-walled transmission: a pane with two parallel interfaces, which bends nothing.
+
+use super::{LobeClass, LobeModel, LobeSample};
+use crate::color::Rgb;
+use crate::materials::fresnel;
+use crate::math::DVec3;
+
+/// A thin smooth pane, with all reflections between its faces: `R' = R + T²R/(1 − R²)
+/// = 2R/(1 + R)`.
+#[derive(Clone, Copy, Debug)]
+pub struct ThinDielectric {
+    /// Index of the pane over that of its surroundings.
+    pub eta: f64,
+    /// Colour of what passes.
+    pub tint: Rgb,
+    /// Share of what is not reflected that passes.
+    pub transmission: f64,
+}
+
+impl ThinDielectric {
+    #[inline]
+    fn split(&self, cos: f64) -> (f64, f64) {
+        let f = fresnel::dielectric(cos, self.eta);
+        let sum = 1.0 + f.reflectance;
+        (
+            2.0 * f.reflectance / sum,
+            f.transmittance / sum * self.transmission,
+        )
+    }
+}
+
+impl LobeModel for ThinDielectric {
+    #[inline]
+    fn class(&self) -> LobeClass {
+        LobeClass::Delta
+    }
+
+    #[inline]
+    fn eval(&self, _wo: DVec3, _wi: DVec3) -> (Rgb, f64) {
+        (Rgb::ZERO, 0.0)
+    }
+
+    #[inline]
+    fn sample(&self, wo: DVec3, u_pick: f64, _u: [f64; 2]) -> Option<LobeSample> {
+        let (r, t) = self.split(wo.z);
+        if u_pick * (r + t) < r {
+            return Some(LobeSample {
+                wi: DVec3::new(-wo.x, -wo.y, wo.z),
+                weight: Rgb::splat(r + t),
+                pdf: 0.0,
+            });
+        }
+        Some(LobeSample {
+            wi: -wo,
+            weight: self.tint * (r + t),
+            pdf: 0.0,
+        })
+    }
+
+    #[inline]
+    fn albedo(&self, wo: DVec3) -> Rgb {
+        let (r, t) = self.split(wo.z);
+        Rgb::splat(r) + self.tint * t
+    }
+}

@@ -1,0 +1,71 @@
+//! Materials: what a surface does with light. They answer questions, trace no rays and never
+//! see the scene.
+//!
+//! A [`Material`] turns a surface point into a [`Bsdf`], a stack of lobes; each lobe is one file.
+//! A material kind is one file and one line in [`MATERIALS`].
+//!
+//! Directions `wo` and `wi` point away from the surface. Lobes work in the local frame whose
+//! `z` axis is the shading normal on the side of `wo`.
+
+mod bsdf;
+mod desc;
+pub mod fresnel;
+pub mod lobes;
+mod microfacet;
+
+mod conductor;
+mod dielectric;
+mod lambert;
+mod mirror;
+mod pbr;
+
+pub use bsdf::{Bsdf, BsdfSample, BsdfValue, TransportMode};
+pub use desc::{Interior, MaterialDesc, MaterialTraits};
+pub use lobes::{CustomLobe, Lobe, LobeClass, LobeModel, LobeSample};
+
+use crate::geometry::SurfacePoint;
+
+/// What a surface is made of.
+pub trait Material: Send + Sync {
+    /// The scattering function at a point, seen from `sp.wo`.
+    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf;
+
+    /// What it can do at all; the survey of effects relies on it, so it may promise too much
+    /// but never too little.
+    fn traits(&self) -> MaterialTraits;
+
+    /// The medium behind its front face, if it encloses one that absorbs.
+    fn interior(&self) -> Option<Interior> {
+        None
+    }
+
+    /// Directional-hemispherical reflectance for display, linear RGB.
+    fn albedo(&self, sp: &SurfacePoint) -> crate::color::Rgb {
+        self.bsdf(sp, TransportMode::Radiance).albedo()
+    }
+}
+
+/// A material kind that can be chosen.
+#[derive(Clone, Copy, Debug)]
+pub struct MaterialEntry {
+    /// Name, as the material's extras `{"dualight_material": name}` give it.
+    pub name: &'static str,
+    /// One sentence.
+    pub doc: &'static str,
+    /// Whether this kind is the right one for a glTF material that names none; the first entry
+    /// that claims it wins.
+    pub claims: fn(&MaterialDesc) -> bool,
+    /// Makes the material; the error says which parameter is wrong.
+    pub build: fn(&MaterialDesc) -> Result<Box<dyn Material>, String>,
+}
+
+crate::registry::impl_entry!(MaterialEntry, "material");
+
+/// The material kinds; order matters, the first that claims a description gets it.
+pub static MATERIALS: &[MaterialEntry] = &[
+    lambert::ENTRY,
+    mirror::ENTRY,
+    conductor::ENTRY,
+    dielectric::ENTRY,
+    pbr::ENTRY,
+];

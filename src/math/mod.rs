@@ -1,0 +1,25 @@
+//! Vectors, frames, boxes and rounding bounds: what every other room stands on.
+//!
+//! Geometry is computed in `f64` ([`DVec3`]); what a ray tracing backend sees (vertices, ray
+//! origins and directions) is `f32` and is promoted exactly, so that every backend and the
+//! refinement on the primitive work from the same numbers.
+
+mod aabb;
+mod frame;
+pub mod robust;
+
+pub use aabb::{Aabb, BoundingSphere};
+pub use frame::Frame;
+pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec3};
+
+/// Largest absolute component of `v`.
+#[inline]
+pub fn max_abs(v: DVec3) -> f64 {
+    v.x.abs().max(v.y.abs()).max(v.z.abs())
+}
+
+/// Rounds every component to the nearest `f32` and promotes it back.
+#[inline]
+pub fn round_f32(v: DVec3) -> DVec3 {
+    v.as_vec3().as_dvec3()
+}

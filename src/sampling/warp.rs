@@ -1,0 +1,140 @@
+//! Maps from the unit square to what renderers sample, each with its density.
+
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI};
+
+use crate::math::DVec3;
+
+/// Sine and cosine for `|x| ≤ π/4`, absolute error below 1e-15 (Taylor series to x¹⁷).
+///
+/// Several times faster than the general functions, whose argument reduction is not needed here.
+#[inline]
+fn sin_cos_octant(x: f64) -> (f64, f64) {
+    let x2 = x * x;
+    let s = x
+        * (1.0
+            + x2 * (-1.0 / 6.0
+                + x2 * (1.0 / 120.0
+                    + x2 * (-1.0 / 5040.0
+                        + x2 * (1.0 / 362_880.0
+                            + x2 * (-1.0 / 39_916_800.0
+                                + x2 * (1.0 / 6_227_020_800.0 - x2 / 1_307_674_368_000.0)))))));
+    let c = 1.0
+        + x2 * (-0.5
+            + x2 * (1.0 / 24.0
+                + x2 * (-1.0 / 720.0
+                    + x2 * (1.0 / 40_320.0
+                        + x2 * (-1.0 / 3_628_800.0
+                            + x2 * (1.0 / 479_001_600.0
+                                + x2 * (-1.0 / 87_178_291_200.0 + x2 / 20_922_789_888_000.0)))))));
+    (s, c)
+}
+
+/// Uniform point of the unit disc, by the concentric map of Shirley and Chiu (1997).
+#[inline]
+pub fn disc(u: [f64; 2]) -> [f64; 2] {
+    let a = 2.0 * u[0] - 1.0;
+    let b = 2.0 * u[1] - 1.0;
+    if a == 0.0 && b == 0.0 {
+        return [0.0, 0.0];
+    }
+    if a.abs() > b.abs() {
+        let (s, c) = sin_cos_octant(FRAC_PI_4 * (b / a));
+        [a * c, a * s]
+    } else {
+        let (s, c) = sin_cos_octant(FRAC_PI_4 * (a / b));
+        [b * s, b * c]
+    }
+}
+
+/// Direction around `+z` with density [`cosine_hemisphere_pdf`].
+#[inline]
+pub fn cosine_hemisphere(u: [f64; 2]) -> DVec3 {
+    let [x, y] = disc(u);
+    DVec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
+}
+
+/// Density `cos θ / π` in solid angle.
+#[inline]
+pub fn cosine_hemisphere_pdf(cos_theta: f64) -> f64 {
+    cos_theta.max(0.0) * FRAC_1_PI
+}
+
+/// Uniform direction of the unit sphere; density `1/4π`.
+#[inline]
+pub fn sphere(u: [f64; 2]) -> DVec3 {
+    cone(u, -1.0)
+}
+
+/// Direction around `+z`, uniform in solid angle among those with `cos θ ≥ cos_max`.
+/// Density [`cone_pdf`].
+#[inline]
+pub fn cone(u: [f64; 2], cos_max: f64) -> DVec3 {
+    cone_from_complement(u, 1.0 - cos_max)
+}
+
+/// As [`cone`], given `1 − cos θ_max`: keeps its digits for a narrow cone.
+#[inline]
+pub fn cone_from_complement(u: [f64; 2], one_minus_cos_max: f64) -> DVec3 {
+    // The disc's radius squared is uniform: it serves as the height, its angle as the azimuth.
+    let [x, y] = disc(u);
+    let r2 = (x * x + y * y).min(1.0);
+    let h = one_minus_cos_max * r2;
+    let cos_theta = 1.0 - h;
+    // sin²θ = h (2 − h); dividing by r² leaves a form that does not cancel.
+    let scale = (one_minus_cos_max * (2.0 - h)).max(0.0).sqrt();
+    DVec3::new(x * scale, y * scale, cos_theta)
+}
+
+/// Density of [`cone`] in solid angle, inside the cone.
+#[inline]
+pub fn cone_pdf(one_minus_cos_max: f64) -> f64 {
+    1.0 / (2.0 * PI * one_minus_cos_max)
+}
+
+/// Barycentric weights of the second and third vertex of a uniform point of a triangle.
+///
+/// Source: Heitz, *A Low-Distortion Map Between Triangle and Square*, 2019.
+#[inline]
+pub fn triangle(u: [f64; 2]) -> [f64; 2] {
+    if u[0] > u[1] {
+        let y = 0.5 * u[1];
+        [u[0] - y, y]
+    } else {
+        let x = 0.5 * u[0];
+        [x, u[1] - x]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn octant_sine_and_cosine_match_the_library() {
+        for i in -1000..=1000 {
+            let x = f64::from(i) / 1000.0 * FRAC_PI_4;
+            let (s, c) = sin_cos_octant(x);
+            assert!(
+                (s - x.sin()).abs() < 1e-15 && (c - x.cos()).abs() < 1e-15,
+                "{x}"
+            );
+        }
+    }
+
+    #[test]
+    fn directions_are_unit_and_inside() {
+        for i in 0..64 {
+            for j in 0..64 {
+                let u = [(f64::from(i) + 0.5) / 64.0, (f64::from(j) + 0.5) / 64.0];
+                for cos_max in [-1.0, 0.0, 0.9, 1.0 - 1e-12] {
+                    let d = cone(u, cos_max);
+                    assert!((d.length() - 1.0).abs() < 1e-12);
+                    assert!(d.z >= cos_max - 1e-15);
+                }
+                assert!((cosine_hemisphere(u).length() - 1.0).abs() < 1e-12);
+                let [b1, b2] = triangle(u);
+                assert!(b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,440 @@
+//! The one way to make a [`Scene`].
+//!
+//! Shapes come in their own space with placements in `f64`. What is placed once is moved to
+//! world space; what is placed more often stays an instance. All positions are taken relative
+//! to the centre of the scene before they are rounded to single precision, so that a scene far
+//! from the origin keeps its digits.
+
+use std::sync::Arc;
+
+use super::Scene;
+use crate::cameras::CameraDesc;
+use crate::color::Rgb;
+use crate::error::{Error, Result};
+
+use crate::geometry::{
+    Geometry, Invalid, LightId, MaterialId, Object, ObjectId, Placement, Shape, ShapeId, SphereSet,
+    TriangleMesh,
+};
+use crate::lights::{LightDesc, LightEntry};
+use crate::materials::{Material, MaterialDesc, MaterialEntry};
+use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3, Vec3};
+use crate::registry::Table;
+use crate::sampling::Discrete;
+
+/// The plugin tables that a scene is built with.
+#[derive(Clone, Debug)]
+pub struct ScenePlugins {
+    /// Kinds of materials.
+    pub materials: Table<MaterialEntry>,
+    /// Kinds of lights.
+    pub lights: Table<LightEntry>,
+}
+
+impl Default for ScenePlugins {
+    fn default() -> Self {
+        Self {
+            materials: Table::new(crate::materials::MATERIALS),
+            lights: Table::new(crate::lights::LIGHTS),
+        }
+    }
+}
+
+/// What a surface emits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance in W/(m²·sr).
+    pub radiance: Rgb,
+    /// Whether the back emits too.
+    pub double_sided: bool,
+}
+
+/// A shape to be placed.
+#[derive(Clone, Debug)]
+pub struct MeshPlacement {
+    /// Which shape.
+    pub shape: ShapeId,
+    /// Its material.
+    pub material: MaterialId,
+    /// World from the shape's space.
+    pub world_from_object: DAffine3,
+    /// Name of the node.
+    pub name: String,
+}
+
+/// Collects the parts of a scene.
+#[derive(Default)]
+pub struct SceneBuilder {
+    plugins: ScenePlugins,
+    shapes: Vec<Shape>,
+    materials: Vec<(Box<dyn Material>, String, Option<Emission>)>,
+    placements: Vec<MeshPlacement>,
+    lights: Vec<LightDesc>,
+    cameras: Vec<CameraDesc>,
+    warnings: Vec<String>,
+}
+
+impl SceneBuilder {
+    /// An empty scene that will be built with the given plugins.
+    pub fn new(plugins: ScenePlugins) -> Self {
+        Self {
+            plugins,
+            ..Self::default()
+        }
+    }
+
+    /// Adds something the user should know.
+    pub fn warn(&mut self, message: impl Into<String>) {
+        self.warnings.push(message.into());
+    }
+
+    /// Adds triangles in their own space; `name` is for the warning about dropped ones.
+    pub fn add_mesh(&mut self, mut mesh: TriangleMesh, name: &str) -> ShapeId {
+        let dropped = mesh.drop_invalid();
+        self.report(dropped, "triangles", name);
+        self.push_shape(Shape::Mesh(mesh))
+    }
+
+    /// Adds spheres in their own space.
+    pub fn add_spheres(&mut self, mut set: SphereSet, name: &str) -> ShapeId {
+        let dropped = set.drop_invalid();
+        self.report(dropped, "spheres", name);
+        self.push_shape(Shape::Spheres(set))
+    }
+
+    fn push_shape(&mut self, shape: Shape) -> ShapeId {
+        self.shapes.push(shape);
+        ShapeId(self.shapes.len() as u32 - 1)
+    }
+
+    fn report(&mut self, d: Invalid, what: &str, name: &str) {
+        if d.total() > 0 {
+            self.warnings.push(format!(
+                "{name}: dropped {} invalid {what} ({} with indices out of range, {} with NaN, \
+                 infinite or huge coordinates, {} without extent)",
+                d.total(),
+                d.index,
+                d.coordinate,
+                d.degenerate
+            ));
+        }
+    }
+
+    /// Adds a material: of the kind that its extras name (`{"dualight_material": name}`), or else
+    /// of the first kind that claims it.
+    ///
+    /// # Errors
+    /// An unknown kind, or a parameter that the kind rejects.
+    pub fn add_material(&mut self, desc: &MaterialDesc) -> Result<MaterialId> {
+        let table = &self.plugins.materials;
+        let entry = match desc.extras.get("dualight_material") {
+            Some(kind) => table.find(kind.as_str().unwrap_or_default())?,
+            None => table
+                .entries()
+                .iter()
+                .find(|e| (e.claims)(desc))
+                .ok_or_else(|| Error::Usage(format!("no material kind fits '{}'", desc.name)))?,
+        };
+        let material = (entry.build)(desc)
+            .map_err(|e| Error::Usage(format!("material '{}': {e}", desc.name)))?;
+        let emission = (!desc.emission.is_black()).then_some(Emission {
+            radiance: desc.emission,
+            double_sided: desc.double_sided,
+        });
+        self.materials.push((material, desc.name.clone(), emission));
+        Ok(MaterialId(self.materials.len() as u32 - 1))
+    }
+
+    /// Places a shape in the world.
+    pub fn place(&mut self, placement: MeshPlacement) {
+        self.placements.push(placement);
+    }
+
+    /// Adds a light without surface; its `scene` is filled in later.
+    pub fn add_light(&mut self, desc: LightDesc) {
+        self.lights.push(desc);
+    }
+
+    /// Adds a camera.
+    pub fn add_camera(&mut self, desc: CameraDesc) {
+        self.cameras.push(desc);
+    }
+
+    /// Number of placed shapes so far.
+    pub fn placed(&self) -> usize {
+        self.placements.len()
+    }
+
+    /// Builds the scene.
+    ///
+    /// # Errors
+    /// A light that its kind rejects.
+    pub fn finish(mut self) -> Result<Scene> {
+        let center = self.world_center();
+        let geometry = self.bake(center);
+        let bounds = geometry.bounds();
+        let (lights, light_names, geometry) = self.build_lights(geometry, center, bounds)?;
+        let mut cameras = self.cameras;
+        for c in &mut cameras {
+            c.world_from_camera.translation -= center;
+        }
+        let (mut materials, mut material_names) = (Vec::new(), Vec::new());
+        for (m, name, _) in self.materials {
+            materials.push(m);
+            material_names.push(name);
+        }
+        Ok(Scene {
+            choose_light: Discrete::new(lights.iter().map(|l| l.power().luminance())),
+            geometry,
+            materials,
+            material_names,
+            lights,
+            light_names,
+            cameras,
+            bounds,
+            center,
+            warnings: self.warnings,
+        })
+    }
+
+    /// Centre of the world-space boxes of all placements, in `f64`.
+    fn world_center(&self) -> DVec3 {
+        let mut all = Aabb::EMPTY;
+        let mut local: Vec<Option<Aabb>> = vec![None; self.shapes.len()];
+        for p in &self.placements {
+            let b = *local[p.shape.index()]
+                .get_or_insert_with(|| self.shapes[p.shape.index()].bounds());
+            if b.is_empty() {
+                continue;
+            }
+            for k in 0..8 {
+                let pick = |bit: usize, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
+                let corner = DVec3::new(
+                    pick(0, b.min.x, b.max.x),
+                    pick(1, b.min.y, b.max.y),
+                    pick(2, b.min.z, b.max.z),
+                );
+                let w = p.world_from_object.transform_point3(corner);
+                if w.is_finite() {
+                    all.grow(w);
+                }
+            }
+        }
+        all.center()
+    }
+
+    fn bake(&mut self, center: DVec3) -> Geometry {
+        let mut users = vec![0usize; self.shapes.len()];
+        for p in &self.placements {
+            users[p.shape.index()] += 1;
+        }
+        let mut geometry = Geometry::default();
+        let mut shared: Vec<Option<ShapeId>> = vec![None; self.shapes.len()];
+        let placements = std::mem::take(&mut self.placements);
+        for p in placements {
+            let index = p.shape.index();
+            let mut world = p.world_from_object;
+            world.translation -= center;
+            let push = |geometry: &mut Geometry, shape: Shape| {
+                geometry.shapes.push(shape);
+                ShapeId(geometry.shapes.len() as u32 - 1)
+            };
+            let baked = match &self.shapes[index] {
+                Shape::Spheres(set) => bake_spheres(set, &world).map(Shape::Spheres),
+                Shape::Mesh(mesh) => (users[index] == 1 || Placement::new(world).is_none())
+                    .then(|| Shape::Mesh(bake_mesh(mesh, &world))),
+            };
+            let (shape, placement) = match (baked, Placement::new(world)) {
+                (Some(mut shape), _) => {
+                    // Baking can flatten or overflow what was valid in its own space.
+                    let dropped = match &mut shape {
+                        Shape::Mesh(m) => m.drop_invalid(),
+                        Shape::Spheres(s) => s.drop_invalid(),
+                    };
+                    self.report(dropped, "primitives", &p.name);
+                    (push(&mut geometry, shape), None)
+                }
+                (None, Some(place)) => {
+                    let id = *shared[index]
+                        .get_or_insert_with(|| push(&mut geometry, self.shapes[index].clone()));
+                    (id, Some(place))
+                }
+                (None, None) => {
+                    self.warnings.push(format!(
+                        "{}: its transform is singular, so its spheres are left out",
+                        p.name
+                    ));
+                    continue;
+                }
+            };
+            if geometry.shape(shape).is_empty() {
+                continue;
+            }
+            geometry.objects.push(Object {
+                shape,
+                placement,
+                material: p.material,
+                light: None,
+                name: Arc::from(p.name),
+            });
+        }
+        geometry
+    }
+
+    fn build_lights(
+        &mut self,
+        mut geometry: Geometry,
+        center: DVec3,
+        bounds: Aabb,
+    ) -> Result<(
+        Vec<Box<dyn crate::lights::Light>>,
+        Vec<(String, &'static str)>,
+        Geometry,
+    )> {
+        let mut descs: Vec<(LightDesc, Option<ObjectId>)> = std::mem::take(&mut self.lights)
+            .into_iter()
+            .map(|d| {
+                (
+                    LightDesc {
+                        position: d.position - center,
+                        ..d
+                    },
+                    None,
+                )
+            })
+            .collect();
+        for (i, object) in geometry.objects.iter().enumerate() {
+            let Some(emission) = self.materials[object.material.index()].2 else {
+                continue;
+            };
+            let id = ObjectId(i as u32);
+            let desc = LightDesc {
+                name: object.name.to_string(),
+                strength: emission.radiance,
+                double_sided: emission.double_sided,
+                ..surface_light(&geometry, id)
+            };
+            descs.push((desc, Some(id)));
+        }
+        let (mut lights, mut names): (Vec<Box<dyn crate::lights::Light>>, Vec<_>) =
+            (Vec::new(), Vec::new());
+        let scene = bounds.bounding_sphere();
+        for (mut d, object) in descs {
+            if d.strength.is_black() {
+                continue;
+            }
+            d.scene = BoundingSphere {
+                radius: scene.radius * (1.0 + 1e-6),
+                ..scene
+            };
+            let light = (self.plugins.lights.find(d.kind)?.build)(&d)
+                .map_err(|e| Error::Usage(format!("light '{}': {e}", d.name)))?;
+            if let Some(id) = object {
+                geometry.objects[id.index()].light = Some(LightId(lights.len() as u32));
+            }
+            lights.push(light);
+            names.push((d.name, d.kind));
+        }
+        Ok((lights, names, geometry))
+    }
+}
+
+/// World-space triangles or spheres of an emitting object.
+fn surface_light(geometry: &Geometry, id: ObjectId) -> LightDesc {
+    let object = geometry.object(id);
+    let world = object
+        .placement
+        .map_or(DAffine3::IDENTITY, |p| p.world_from_object);
+    // Mirrored triangles turn over, so that their front stays the front.
+    let flip = world.matrix3.determinant() < 0.0;
+    match geometry.shape(object.shape) {
+        Shape::Mesh(mesh) => LightDesc {
+            kind: "area",
+            triangles: (0..mesh.indices.len() as u32)
+                .map(|i| {
+                    let [a, b, c] = mesh.corners(i).map(|p| world.transform_point3(p));
+                    if flip { [a, c, b] } else { [a, b, c] }
+                })
+                .collect(),
+            ..Default::default()
+        },
+        Shape::Spheres(set) => LightDesc {
+            kind: "sphere",
+            spheres: (0..set.spheres.len() as u32)
+                .map(|i| {
+                    let (c, r) = set.get(i);
+                    BoundingSphere {
+                        center: world.transform_point3(c),
+                        radius: r,
+                    }
+                })
+                .collect(),
+            ..Default::default()
+        },
+    }
+}
+
+fn bake_mesh(mesh: &TriangleMesh, world: &DAffine3) -> TriangleMesh {
+    let normal_matrix = {
+        let m = world.matrix3;
+        // The cofactor matrix is det · inverse transpose, and exists for singular maps too.
+        let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+        glam::DMat3::from_cols(
+            m.y_axis.cross(m.z_axis) * sign,
+            m.z_axis.cross(m.x_axis) * sign,
+            m.x_axis.cross(m.y_axis) * sign,
+        )
+    };
+    let flip = world.matrix3.determinant() < 0.0;
+    TriangleMesh {
+        positions: mesh
+            .positions
+            .iter()
+            .map(|&p| {
+                world
+                    .transform_point3(Vec3::from(p).as_dvec3())
+                    .as_vec3()
+                    .into()
+            })
+            .collect(),
+        indices: mesh
+            .indices
+            .iter()
+            .map(|&[a, b, c]| if flip { [a, c, b] } else { [a, b, c] })
+            .collect(),
+        normals: mesh
+            .normals
+            .iter()
+            .map(|&n| {
+                (normal_matrix * Vec3::from(n).as_dvec3())
+                    .normalize_or_zero()
+                    .as_vec3()
+                    .into()
+            })
+            .collect(),
+        uvs: mesh.uvs.clone(),
+    }
+}
+
+/// Spheres under a similarity stay spheres; `None` if the map makes ellipsoids of them.
+fn bake_spheres(set: &SphereSet, world: &DAffine3) -> Option<SphereSet> {
+    let m = world.matrix3;
+    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
+    let s2 = x.length_squared();
+    let tolerance = 1e-10 * s2;
+    let similar = (y.length_squared() - s2).abs() <= tolerance
+        && (z.length_squared() - s2).abs() <= tolerance
+        && x.dot(y).abs() <= tolerance
+        && y.dot(z).abs() <= tolerance
+        && z.dot(x).abs() <= tolerance
+        && s2 > 0.0;
+    similar.then(|| SphereSet {
+        spheres: (0..set.spheres.len() as u32)
+            .map(|i| {
+                let (c, r) = set.get(i);
+                let c = world.transform_point3(c).as_vec3();
+                [c.x, c.y, c.z, (r * s2.sqrt()) as f32]
+            })
+            .collect(),
+    })
+}

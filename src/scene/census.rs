@@ -1,0 +1,76 @@
+//! What a scene holds: the counts that the survey of effects and `inspect` read.
+
+use super::Scene;
+use crate::geometry::Shape;
+use crate::materials::MaterialTraits;
+
+/// Counts of what is in a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Census {
+    /// Distinct shapes.
+    pub shapes: usize,
+    /// Placed shapes.
+    pub objects: usize,
+    /// Placed shapes that are instances.
+    pub instances: usize,
+    /// Distinct triangles in memory.
+    pub triangles: u64,
+    /// Triangles as seen, instances counted each.
+    pub placed_triangles: u64,
+    /// Analytic spheres as seen.
+    pub spheres: u64,
+    /// Materials that some object uses.
+    pub materials: usize,
+    /// Lights by kind: name and count.
+    pub lights: Vec<(&'static str, usize)>,
+    /// Upper bounds over all materials that some object uses.
+    pub traits: MaterialTraits,
+    /// Objects whose material reflects like a mirror or transmits.
+    pub specular_objects: usize,
+    /// Whether some body absorbs light on its way.
+    pub absorbs: bool,
+}
+
+impl Census {
+    /// Counts what is in `scene`.
+    pub fn new(scene: &Scene) -> Self {
+        let g = &scene.geometry;
+        let mut c = Self {
+            shapes: g.shapes.len(),
+            objects: g.objects.len(),
+            ..Self::default()
+        };
+        for shape in &g.shapes {
+            if let Shape::Mesh(m) = shape {
+                c.triangles += m.indices.len() as u64;
+            }
+        }
+        let mut used = vec![false; scene.materials.len()];
+        for o in &g.objects {
+            c.instances += usize::from(o.placement.is_some());
+            match g.shape(o.shape) {
+                Shape::Mesh(m) => c.placed_triangles += m.indices.len() as u64,
+                Shape::Spheres(s) => c.spheres += s.spheres.len() as u64,
+            }
+            used[o.material.index()] = true;
+            let material = scene.material(o.material);
+            let t = material.traits();
+            c.specular_objects += usize::from(t.reflects || t.transmits);
+            c.absorbs |= material.interior().is_some();
+            c.traits = MaterialTraits {
+                diffuse: c.traits.diffuse.max(t.diffuse),
+                reflects: c.traits.reflects || t.reflects,
+                transmits: c.traits.transmits || t.transmits,
+                refracts: c.traits.refracts || t.refracts,
+            };
+        }
+        c.materials = used.iter().filter(|u| **u).count();
+        for (_, kind) in &scene.light_names {
+            match c.lights.iter_mut().find(|(k, _)| k == kind) {
+                Some((_, n)) => *n += 1,
+                None => c.lights.push((kind, 1)),
+            }
+        }
+        c
+    }
+}

@@ -1,0 +1,89 @@
+//! The scene: arenas with typed ids, written by the one builder, frozen after import.
+
+mod builder;
+mod census;
+
+pub use builder::{Emission, MeshPlacement, SceneBuilder, ScenePlugins};
+pub use census::Census;
+
+use crate::cameras::CameraDesc;
+use crate::color::Rgb;
+use crate::geometry::{Geometry, LightId, MaterialId, Ray, SurfacePoint};
+use crate::lights::Light;
+use crate::materials::Material;
+use crate::math::{Aabb, DVec3};
+use crate::sampling::Discrete;
+
+/// Everything that is rendered.
+pub struct Scene {
+    /// Shapes and their placements.
+    pub geometry: Geometry,
+    /// Materials, named by [`MaterialId`].
+    pub materials: Vec<Box<dyn Material>>,
+    /// Names of the materials, for reports.
+    pub material_names: Vec<String>,
+    /// Lights, named by [`LightId`].
+    pub lights: Vec<Box<dyn Light>>,
+    /// Names and kinds of the lights, for reports.
+    pub light_names: Vec<(String, &'static str)>,
+    /// How often each light is chosen, by flux.
+    pub choose_light: Discrete,
+    /// Cameras, in the order of the file.
+    pub cameras: Vec<CameraDesc>,
+    /// World-space box of the geometry, after recentring.
+    pub bounds: Aabb,
+    /// The file's coordinates of our origin: what was subtracted from every position.
+    pub center: DVec3,
+    /// What was dropped or could not be honoured, for the user.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// The material named `id`.
+    #[inline]
+    pub fn material(&self, id: MaterialId) -> &dyn Material {
+        &*self.materials[id.index()]
+    }
+
+    /// The light named `id`.
+    #[inline]
+    pub fn light(&self, id: LightId) -> &dyn Light {
+        &*self.lights[id.index()]
+    }
+
+    /// Total emitted flux in W.
+    pub fn flux(&self) -> Rgb {
+        self.lights.iter().map(|l| l.power()).sum()
+    }
+
+    /// Radiance emitted at a surface point toward where the ray came from.
+    #[inline]
+    pub fn emitted(&self, sp: &SurfacePoint) -> Rgb {
+        sp.light.map_or(Rgb::ZERO, |id| self.light(id).radiance(sp))
+    }
+
+    /// The density in solid angle with which light sampling at `from` finds the emitter at `on`.
+    #[inline]
+    pub fn pdf_light(&self, from: DVec3, on: &SurfacePoint) -> f64 {
+        on.light.map_or(0.0, |id| {
+            self.light(id).pdf_li(from, on) * self.choose_light.probability(id.index())
+        })
+    }
+
+    /// Share of the light that survives the segment of `ray` that ended at `sp`, if it ran
+    /// inside an absorbing body (Beer–Lambert).
+    #[inline]
+    pub fn transmittance(&self, sp: &SurfacePoint) -> Option<Rgb> {
+        if sp.front {
+            return None;
+        }
+        let interior = self.material(sp.material).interior()?;
+        Some(interior.transmittance(sp.distance))
+    }
+
+    /// As [`Geometry::surface_point`].
+    #[inline]
+    pub fn surface_point(&self, ray: &Ray, hit: &crate::geometry::Hit) -> SurfacePoint {
+        self.geometry.surface_point(ray, hit)
+    }
+}
