@@ -1,0 +1,88 @@
+//! What a run counted and how long its stages took; written as JSON.
+
+use serde::Serialize;
+
+/// Rays traced, by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RayCounts {
+    /// From the camera.
+    pub camera: u64,
+    /// Toward lights.
+    pub shadow: u64,
+    /// Continuations of camera paths.
+    pub bounce: u64,
+    /// Final gather.
+    pub gather: u64,
+    /// Photon path segments.
+    pub photon: u64,
+}
+
+impl RayCounts {
+    /// Adds the counts of another part of the work.
+    pub fn add(&mut self, o: &Self) {
+        self.camera += o.camera;
+        self.shadow += o.shadow;
+        self.bounce += o.bounce;
+        self.gather += o.gather;
+        self.photon += o.photon;
+    }
+}
+
+/// What became of the photons of one map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PhotonCounts {
+    /// Photons that left lights.
+    pub emitted: u64,
+    /// Photons stored.
+    pub stored: u64,
+    /// Of the emitted ones, those that hit nothing useful and were given up.
+    pub discarded: u64,
+    /// Flux that left the lights, W (sum of RGB).
+    pub flux_emitted: f64,
+    /// Flux that was absorbed at surfaces or in media.
+    pub flux_absorbed: f64,
+    /// Flux that left the scene.
+    pub flux_escaped: f64,
+    /// Flux that was cut off at the depth limit.
+    pub flux_cut: f64,
+}
+
+/// Seconds of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageTime {
+    /// Its name.
+    pub stage: &'static str,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+/// Everything a run tells about itself.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Rays by kind.
+    pub rays: RayCounts,
+    /// The global photon map.
+    pub global_photons: PhotonCounts,
+    /// The caustic photon map.
+    pub caustic_photons: PhotonCounts,
+    /// Stages in the order they ran.
+    pub stages: Vec<StageTime>,
+    /// Camera samples per pixel: fewest and most.
+    pub samples_per_pixel: (u32, u32),
+    /// Pixel sums that were not finite and were left out; above zero is a bug.
+    pub rejected_pixels: u64,
+    /// Name and version of the ray tracing backend.
+    pub accelerator: String,
+    /// Bytes held by the ray tracing backend.
+    pub accelerator_bytes: u64,
+    /// Largest resident size of the process in bytes, where the system tells it.
+    pub peak_memory_bytes: Option<u64>,
+}
+
+/// Largest resident size of this process so far, in bytes (Linux: `VmHWM`).
+pub fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024)
+}
