@@ -35,6 +35,13 @@ pub mod cameras;
 pub mod color;
 pub mod control;
 pub mod error;
+#[cfg(feature = "embree")]
+#[path = "../ffi/mod.rs"]
+#[allow(
+    unsafe_code,
+    reason = "the one place that calls C; its rules are in ffi/README.md"
+)]
+pub mod ffi;
 pub mod film;
 pub mod geometry;
 pub mod integrators;

@@ -12,6 +12,8 @@
 //! - of several primitives at the same distance any one may be named, but always the same one
 //!   for the same ray.
 
+#[cfg(feature = "embree")]
+mod embree;
 mod linear;
 
 use std::sync::Arc;
@@ -58,4 +60,8 @@ pub struct AcceleratorEntry {
 crate::registry::impl_entry!(AcceleratorEntry, "accelerator");
 
 /// The backends; the first is the default, `linear` is the oracle of the tests.
-pub static ACCELERATORS: &[AcceleratorEntry] = &[linear::ENTRY];
+pub static ACCELERATORS: &[AcceleratorEntry] = &[
+    #[cfg(feature = "embree")]
+    embree::ENTRY,
+    linear::ENTRY,
+];

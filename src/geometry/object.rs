@@ -6,7 +6,7 @@ use super::mesh::COORDINATE_LIMIT;
 use super::{
     Hit, Invalid, LightId, MaterialId, ObjectId, Ray, ShapeId, SurfacePoint, TriangleMesh,
 };
-use crate::math::{Aabb, DAffine3, DVec3, Vec3};
+use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3, Vec3};
 
 /// Analytic spheres in their own (object) space.
 #[derive(Clone, Debug, Default)]
@@ -170,6 +170,19 @@ impl Geometry {
             out.grow(place.world_from_object.transform_point3(corner));
         }
         out
+    }
+
+    /// World-space sphere around an object; exact for a single sphere that is placed in world
+    /// space.
+    pub fn object_bounding_sphere(&self, id: ObjectId) -> BoundingSphere {
+        let object = self.object(id);
+        match (self.shape(object.shape), &object.placement) {
+            (Shape::Spheres(set), None) if set.spheres.len() == 1 => {
+                let (center, radius) = set.get(0);
+                BoundingSphere { center, radius }
+            }
+            _ => self.object_bounds(id).bounding_sphere(),
+        }
     }
 
     /// World-space box of everything.

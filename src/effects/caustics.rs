@@ -1,0 +1,24 @@
+//! Caustics: need a light, something that redirects it, and a diffuse receiver.
+
+use super::{EffectEntry, EffectSet, Verdict, lights};
+
+/// The table's line.
+pub(super) const ENTRY: EffectEntry = EffectEntry {
+    name: "caustics",
+    doc: "light focused onto diffuse surfaces by mirrors and glass, from the caustic photon map",
+    bit: EffectSet::CAUSTICS,
+    verdict: |c| {
+        if c.specular_objects == 0 {
+            Verdict::off("nothing reflects or transmits light onto other surfaces")
+        } else if lights(c) == 0 {
+            Verdict::off("nothing emits light")
+        } else if c.traits.diffuse == 0.0 {
+            Verdict::off("no diffuse surface receives them")
+        } else {
+            Verdict::on(format!(
+                "{} object(s) redirect light onto diffuse surfaces",
+                c.specular_objects
+            ))
+        }
+    },
+};

@@ -1,0 +1,104 @@
+//! Pass 1 of photon mapping: photons leave the lights, are followed through the scene and stored
+//! where they meet diffuse surfaces, in two maps (Jensen 1996).
+//!
+//! Path space, written from the camera E to the light L with D for a diffuse scattering and S
+//! for any other:
+//! - the **global** map stores every photon that arrives at a diffuse surface, with its class:
+//!   `L D` (direct), `L S⁺ D` (caustic), or any path with an earlier D (indirect);
+//! - the **caustic** map stores `L S⁺ D` only, from photons sent toward specular objects alone.
+//!
+//! Emission is a plugin family: one file and one line in [`EMISSIONS`].
+
+mod emit;
+mod ledger;
+pub mod map;
+mod photon;
+mod targets;
+mod trace;
+mod uniform;
+
+pub use emit::{EMISSIONS, EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
+pub use ledger::Ledger;
+pub use map::{IrradianceMap, PhotonMap};
+pub use photon::{Photon, PhotonClass};
+pub use targets::Targets;
+
+use crate::accel::Accelerator;
+use crate::control::Control;
+use crate::effects::EffectSet;
+use crate::scene::Scene;
+use crate::stats::{PhotonCounts, RayCounts};
+
+/// What the photon pass is told.
+#[derive(Clone, Debug)]
+pub struct PhotonSettings {
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Photons emitted for the global map.
+    pub global: u64,
+    /// Photons emitted for the caustic map.
+    pub caustic: u64,
+    /// Photons in a density estimate.
+    pub nearest: usize,
+    /// Most surfaces a photon may meet.
+    pub max_depth: Option<u32>,
+    /// Whether paths end by Russian roulette; otherwise by the depth limit alone.
+    pub roulette: bool,
+}
+
+/// The finished maps; a map that the effects do not call for is absent.
+#[derive(Debug, Default)]
+pub struct PhotonMaps {
+    /// All photons on diffuse surfaces.
+    pub global: Option<PhotonMap>,
+    /// Irradiance at some of the global photons, for the final gather.
+    pub irradiance: Option<IrradianceMap>,
+    /// Photons that came by specular surfaces only.
+    pub caustic: Option<PhotonMap>,
+    /// What became of the global photons.
+    pub global_counts: PhotonCounts,
+    /// What became of the caustic photons.
+    pub caustic_counts: PhotonCounts,
+    /// Rays traced.
+    pub rays: RayCounts,
+}
+
+/// Emits, follows and stores photons, and builds the maps that `effects` call for.
+pub fn trace_photons(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    emission: &EmissionEntry,
+    effects: EffectSet,
+    settings: &PhotonSettings,
+    gather: bool,
+    control: &Control,
+) -> PhotonMaps {
+    let mut maps = PhotonMaps::default();
+    let area = map::surface_area(scene);
+    let context = |purpose, count| EmissionContext {
+        scene,
+        accel,
+        seed: settings.seed,
+        purpose,
+        count,
+    };
+    if effects.contains(EffectSet::INDIRECT) && settings.global > 0 {
+        let source = (emission.build)(&context(Purpose::Global, settings.global));
+        let pass = trace::run(scene, accel, &*source, Purpose::Global, settings, control);
+        maps.global_counts = pass.counts;
+        maps.rays.add(&pass.rays);
+        let map = PhotonMap::build(pass.photons, settings.nearest, area);
+        if gather {
+            maps.irradiance = Some(IrradianceMap::build(&map, control));
+        }
+        maps.global = Some(map);
+    }
+    if effects.contains(EffectSet::CAUSTICS) && settings.caustic > 0 {
+        let source = (emission.build)(&context(Purpose::Caustic, settings.caustic));
+        let pass = trace::run(scene, accel, &*source, Purpose::Caustic, settings, control);
+        maps.caustic_counts = pass.counts;
+        maps.rays.add(&pass.rays);
+        maps.caustic = Some(PhotonMap::build(pass.photons, settings.nearest, area));
+    }
+    maps
+}

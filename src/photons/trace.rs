@@ -1,0 +1,163 @@
+//! Following photons through the scene.
+
+use rayon::prelude::*;
+
+use super::emit::{PhotonSource, Purpose};
+use super::ledger::Ledger;
+use super::photon::{Photon, PhotonClass};
+use super::{EmittedPhoton, PhotonSettings};
+use crate::accel::Accelerator;
+use crate::control::Control;
+use crate::materials::{LobeClass, TransportMode};
+use crate::sampling::{Rng, hash2, stream};
+use crate::scene::Scene;
+use crate::stats::{PhotonCounts, RayCounts};
+
+/// Photons followed by one task: enough to hide the cost of a task, few enough to share evenly.
+const BATCH: u64 = 8192;
+
+/// Longest path when neither roulette nor the user ends it.
+const DEPTH_GUARD: u32 = 4096;
+
+/// Photons of one purpose, in the order of emission.
+pub(super) struct Pass {
+    pub(super) photons: Vec<Photon>,
+    pub(super) counts: PhotonCounts,
+    pub(super) rays: RayCounts,
+}
+
+/// One task's share.
+#[derive(Default)]
+struct Batch {
+    photons: Vec<Photon>,
+    ledger: Ledger,
+    segments: u64,
+}
+
+/// Emits and follows all photons of a source.
+pub(super) fn run(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    source: &dyn PhotonSource,
+    purpose: Purpose,
+    settings: &PhotonSettings,
+    control: &Control,
+) -> Pass {
+    let n = source.len();
+    let name = match purpose {
+        Purpose::Global => "global photons",
+        Purpose::Caustic => "caustic photons",
+    };
+    let stage = control.stage(name, "photons", n);
+    let tracer = Tracer { scene, accel, purpose, settings };
+    let batches: Vec<Batch> = (0..n.div_ceil(BATCH))
+        .into_par_iter()
+        .map(|b| {
+            let mut batch = Batch::default();
+            let (lo, hi) = (b * BATCH, ((b + 1) * BATCH).min(n));
+            if control.stopped().is_none() {
+                for i in lo..hi {
+                    batch.ledger.photons += 1;
+                    if let Some(photon) = source.emit(i) {
+                        tracer.follow(&photon, i, &mut batch);
+                    }
+                }
+            }
+            stage.advance(hi - lo);
+            batch
+        })
+        .collect();
+    let mut ledger = Ledger::default();
+    let mut rays = RayCounts::default();
+    let mut photons = Vec::with_capacity(batches.iter().map(|b| b.photons.len()).sum());
+    for b in batches {
+        ledger.add(&b.ledger);
+        rays.photon += b.segments;
+        photons.extend_from_slice(&b.photons);
+    }
+    let counts = ledger.counts(photons.len() as u64);
+    Pass { photons, counts, rays }
+}
+
+struct Tracer<'a> {
+    scene: &'a Scene,
+    accel: &'a dyn Accelerator,
+    purpose: Purpose,
+    settings: &'a PhotonSettings,
+}
+
+impl Tracer<'_> {
+    /// Follows one photon to its end.
+    fn follow(&self, photon: &EmittedPhoton, index: u64, out: &mut Batch) {
+        let key = match self.purpose {
+            Purpose::Global => stream::GLOBAL_PHOTONS,
+            Purpose::Caustic => stream::CAUSTIC_PHOTONS,
+        };
+        let mut rng = Rng::new(hash2(hash2(self.settings.seed, key), !index));
+        let max_depth = self.settings.max_depth.unwrap_or(DEPTH_GUARD);
+        let mut ray = photon.ray;
+        let mut power = photon.power;
+        let mut class = PhotonClass::Direct;
+        out.ledger.emitted += power;
+        for depth in 1.. {
+            out.segments += 1;
+            let Some(hit) = self.accel.intersect(&ray) else {
+                out.ledger.escaped += power;
+                return;
+            };
+            let sp = self.scene.surface_point(&ray, &hit);
+            if let Some(t) = self.scene.transmittance(&sp) {
+                let left = power * t;
+                out.ledger.absorbed += power - left;
+                power = left;
+            }
+            let mut bsdf = self.scene.material(sp.material).bsdf(&sp, TransportMode::Importance);
+            let store = match self.purpose {
+                Purpose::Global => true,
+                Purpose::Caustic => class == PhotonClass::Caustic,
+            };
+            if store && bsdf.has_diffuse() {
+                let ng = if sp.front { sp.ng } else { -sp.ng };
+                out.photons.push(Photon::new(sp.p, sp.wo, ng, power, class));
+            }
+            if self.purpose == Purpose::Caustic && bsdf.has_diffuse() {
+                if !bsdf.has_specular() {
+                    // The end of a caustic; before any specular surface, of no use at all.
+                    out.ledger.cut += power;
+                    out.ledger.discarded += u64::from(class == PhotonClass::Direct);
+                    return;
+                }
+                bsdf = bsdf.specular_only();
+            }
+            if depth >= max_depth {
+                out.ledger.cut += power;
+                return;
+            }
+            let Some(s) = bsdf.sample(rng.next_1d(), rng.next_2d()) else {
+                out.ledger.absorbed += power;
+                return;
+            };
+            let mut weight = s.weight;
+            if self.settings.roulette {
+                let survive = weight.max_channel().min(1.0);
+                if rng.next_1d() >= survive {
+                    out.ledger.absorbed += power;
+                    return;
+                }
+                weight = weight / survive;
+            }
+            let next = power * weight;
+            out.ledger.absorbed += power - next;
+            power = next;
+            if power.is_black() {
+                return;
+            }
+            class = match (class, s.class) {
+                (_, LobeClass::Diffuse) => PhotonClass::Indirect,
+                (PhotonClass::Indirect, _) => PhotonClass::Indirect,
+                _ => PhotonClass::Caustic,
+            };
+            ray = sp.spawn(s.wi);
+        }
+    }
+}
