@@ -34,6 +34,7 @@ pub mod ad;
 pub mod cameras;
 pub mod color;
 pub mod control;
+pub mod effects;
 pub mod error;
 #[cfg(feature = "embree")]
 #[path = "../ffi/mod.rs"]
@@ -48,7 +49,9 @@ pub mod integrators;
 pub mod lights;
 pub mod materials;
 pub mod math;
+pub mod photons;
 pub mod pipeline;
+pub mod plugins;
 pub mod registry;
 pub mod sampling;
 pub mod scene;

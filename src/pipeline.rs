@@ -1,16 +1,28 @@
-//! From a scene to an image: one call per stage.
+//! From a scene to an image: one call per stage, each with its time.
 
-use crate::integrators::IntegratorSettings;
+use std::time::Instant;
+
+use crate::control::{Control, Stopped};
+use crate::effects::{self, Decision};
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::integrators::{IntegratorSettings, Region, RenderContext, camera_pass};
+use crate::photons::{PhotonMaps, PhotonSettings, trace_photons};
+use crate::plugins::Registry;
+use crate::scene::Scene;
+use crate::stats::{StageTime, Statistics, peak_memory};
 
 /// What to render, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderSettings {
-    /// Name of the integrator.
-    pub integrator: String,
+    /// Name of the integrator; `None` for the first of the table.
+    pub integrator: Option<String>,
     /// Name of the ray tracing backend; `None` for the first of the table.
     pub accelerator: Option<String>,
-    /// Name of the photon emission.
-    pub emission: String,
+    /// Name of the photon emission; `None` for the first of the table.
+    pub emission: Option<String>,
+    /// Which effects to simulate: `auto`, `all`, or `+name,-name` on top of the survey.
+    pub effects: String,
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -25,4 +37,216 @@ pub struct RenderSettings {
     pub threads: Option<usize>,
     /// What the integrator is told.
     pub integrator_settings: IntegratorSettings,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            integrator: None,
+            accelerator: None,
+            emission: None,
+            effects: "auto".into(),
+            width: 512,
+            height: 512,
+            spp: 16,
+            crop: None,
+            camera: None,
+            threads: None,
+            integrator_settings: IntegratorSettings::default(),
+        }
+    }
+}
+
+/// A rendered image with what it took.
+#[derive(Debug)]
+pub struct Rendering {
+    /// The image.
+    pub film: Film,
+    /// Rays, photons, seconds.
+    pub statistics: Statistics,
+    /// Whether the run ended early.
+    pub stopped: Option<Stopped>,
+    /// What was simulated and what was skipped, with reasons.
+    pub effects: Vec<Decision>,
+}
+
+/// Renders a scene.
+///
+/// # Errors
+/// Names that no plugin or camera has, a scene without a camera, a backend that fails.
+pub fn render(
+    scene: &Scene,
+    settings: &RenderSettings,
+    registry: &Registry,
+    control: &Control,
+) -> Result<Rendering> {
+    let threads = settings.threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Error::Usage(format!("--threads {threads}: {e}; ask for fewer")))?;
+    pool.install(|| render_in_pool(scene, settings, registry, control))
+}
+
+fn render_in_pool(
+    scene: &Scene,
+    settings: &RenderSettings,
+    registry: &Registry,
+    control: &Control,
+) -> Result<Rendering> {
+    let mut clock = Clock::default();
+    let options = &settings.integrator_settings;
+
+    let integrator = registry
+        .integrators
+        .choose(settings.integrator.as_deref())?;
+    let emission = registry.emissions.choose(settings.emission.as_deref())?;
+    let backend = registry
+        .accelerators
+        .choose(settings.accelerator.as_deref())?;
+    let camera = choose_camera(scene, settings, registry)?;
+    let region = region(settings)?;
+    let effects = effects::survey(scene, &settings.effects)?;
+    clock.lap("survey");
+
+    let accel = {
+        let _stage = control.stage("build", "primitives", 0);
+        (backend.build)(&scene.geometry, rayon::current_num_threads())?
+    };
+    clock.lap("build");
+
+    let maps = if integrator.photons {
+        let photons = PhotonSettings {
+            seed: options.seed,
+            global: options.photons,
+            caustic: options.caustic_photons,
+            nearest: options.nearest,
+            max_depth: options.max_depth,
+            roulette: options.roulette,
+        };
+        let gather = options.gather_rays > 0;
+        trace_photons(
+            scene,
+            &*accel,
+            emission,
+            effects.set,
+            &photons,
+            gather,
+            control,
+        )
+    } else {
+        PhotonMaps::default()
+    };
+    clock.lap("photons");
+
+    let context = RenderContext {
+        scene,
+        accel: &*accel,
+        maps: &maps,
+        effects: effects.set,
+        settings: options,
+    };
+    let integrator = (integrator.build)(context);
+    let mut film = Film::new(settings.width, settings.height);
+    let camera_rays = camera_pass(
+        &*camera,
+        &*integrator,
+        options.seed,
+        settings.spp,
+        region,
+        &mut film,
+        control,
+    );
+    clock.lap("pixels");
+
+    let built = accel.stats();
+    let mut rays = maps.rays;
+    rays.add(&camera_rays);
+    Ok(Rendering {
+        statistics: Statistics {
+            rays,
+            global_photons: maps.global_counts,
+            caustic_photons: maps.caustic_counts,
+            stages: clock.laps,
+            samples_per_pixel: film.sample_range(),
+            rejected_pixels: film.rejected(),
+            accelerator: built.backend,
+            accelerator_bytes: built.bytes,
+            peak_memory_bytes: peak_memory(),
+        },
+        film,
+        stopped: control.stopped(),
+        effects: effects.decisions,
+    })
+}
+
+fn choose_camera(
+    scene: &Scene,
+    settings: &RenderSettings,
+    registry: &Registry,
+) -> Result<Box<dyn crate::cameras::Camera>> {
+    let desc = match &settings.camera {
+        None => scene.cameras.first().ok_or_else(|| {
+            Error::Usage("the scene has no camera; add one and export it with the scene".into())
+        })?,
+        Some(name) => scene
+            .cameras
+            .iter()
+            .find(|c| c.name == *name)
+            .ok_or_else(|| Error::UnknownPlugin {
+                kind: "camera",
+                name: name.clone(),
+                known: scene
+                    .cameras
+                    .iter()
+                    .map(|c| c.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            })?,
+    };
+    let aspect = f64::from(settings.width) / f64::from(settings.height);
+    let entry = registry.cameras.find(desc.kind)?;
+    (entry.build)(desc, aspect).map_err(|e| Error::Usage(format!("camera '{}': {e}", desc.name)))
+}
+
+fn region(settings: &RenderSettings) -> Result<Region> {
+    let (w, h) = (settings.width, settings.height);
+    if w == 0 || h == 0 || settings.spp == 0 {
+        return Err(Error::Usage(
+            "an image needs at least one pixel and one sample".into(),
+        ));
+    }
+    let [x0, y0, x1, y1] = settings.crop.unwrap_or([0, 0, w, h]);
+    if x0 >= x1 || y0 >= y1 || x1 > w || y1 > h {
+        return Err(Error::Usage(format!(
+            "crop {x0},{y0},{x1},{y1} is not a rectangle within 0,0,{w},{h}"
+        )));
+    }
+    Ok(Region { x0, y0, x1, y1 })
+}
+
+/// Takes the time of stages that follow one another.
+struct Clock {
+    last: Instant,
+    laps: Vec<StageTime>,
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        Self {
+            last: Instant::now(),
+            laps: Vec::new(),
+        }
+    }
+}
+
+impl Clock {
+    fn lap(&mut self, stage: &'static str) {
+        let now = Instant::now();
+        self.laps.push(StageTime {
+            stage,
+            seconds: (now - self.last).as_secs_f64(),
+        });
+        self.last = now;
+    }
 }

@@ -51,6 +51,17 @@ impl<E: Entry + Copy> Table<E> {
             })
     }
 
+    /// The entry named `name`, or the first if no name is given.
+    ///
+    /// # Errors
+    /// As [`find`](Self::find).
+    pub fn choose(&self, name: Option<&str>) -> Result<&E> {
+        match (name, self.entries.first()) {
+            (None, Some(first)) => Ok(first),
+            (name, _) => self.find(name.unwrap_or_default()),
+        }
+    }
+
     /// Adds a plugin of one's own, before the built-in ones.
     ///
     /// # Errors

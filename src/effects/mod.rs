@@ -44,11 +44,17 @@ pub struct Verdict {
 
 impl Verdict {
     fn on(reason: impl Into<String>) -> Self {
-        Self { on: true, reason: reason.into() }
+        Self {
+            on: true,
+            reason: reason.into(),
+        }
     }
 
     fn off(reason: impl Into<String>) -> Self {
-        Self { on: false, reason: reason.into() }
+        Self {
+            on: false,
+            reason: reason.into(),
+        }
     }
 }
 
@@ -105,7 +111,11 @@ pub fn survey(scene: &Scene, wish: &str) -> Result<Effects> {
     let census = Census::new(scene);
     let mut forced = EffectSet::empty();
     let mut banned = EffectSet::empty();
-    for word in wish.split(',').map(str::trim).filter(|w| !w.is_empty() && *w != "auto") {
+    for word in wish
+        .split(',')
+        .map(str::trim)
+        .filter(|w| !w.is_empty() && *w != "auto")
+    {
         if word == "all" {
             forced = EffectSet::all();
             continue;
@@ -119,11 +129,19 @@ pub fn survey(scene: &Scene, wish: &str) -> Result<Effects> {
                 )));
             }
         };
-        let entry = EFFECTS.iter().find(|e| e.name == name).ok_or_else(|| Error::UnknownPlugin {
-            kind: "effect",
-            name: name.into(),
-            known: EFFECTS.iter().map(|e| e.name).collect::<Vec<_>>().join(", "),
-        })?;
+        let entry =
+            EFFECTS
+                .iter()
+                .find(|e| e.name == name)
+                .ok_or_else(|| Error::UnknownPlugin {
+                    kind: "effect",
+                    name: name.into(),
+                    known: EFFECTS
+                        .iter()
+                        .map(|e| e.name)
+                        .collect::<Vec<_>>()
+                        .join(", "),
+                })?;
         target.insert(entry.bit);
     }
     let mut set = EffectSet::empty();
@@ -139,7 +157,11 @@ pub fn survey(scene: &Scene, wish: &str) -> Result<Effects> {
                 found
             };
             set.set(e.bit, verdict.on);
-            Decision { name: e.name, on: verdict.on, reason: verdict.reason }
+            Decision {
+                name: e.name,
+                on: verdict.on,
+                reason: verdict.reason,
+            }
         })
         .collect();
     Ok(Effects { set, decisions })

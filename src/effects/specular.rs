@@ -11,7 +11,10 @@ pub(super) const ENTRY: EffectEntry = EffectEntry {
         if c.specular_objects == 0 {
             Verdict::off("no material reflects like a mirror or transmits")
         } else {
-            Verdict::on(format!("{} object(s) reflect or transmit", c.specular_objects))
+            Verdict::on(format!(
+                "{} object(s) reflect or transmit",
+                c.specular_objects
+            ))
         }
     },
 };

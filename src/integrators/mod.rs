@@ -1,38 +1,68 @@
 //! Integrators: how the radiance of a camera sample is estimated. An integrator is one file and
 //! one line in [`INTEGRATORS`].
 
-/// What integrators are told.
-#[derive(Clone, Debug, PartialEq)]
-pub struct IntegratorSettings {
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// Most scattering events along a path from the camera to a light; `None` for no limit.
-    pub max_depth: Option<u32>,
-    /// Whether long paths are ended by Russian roulette.
-    pub roulette: bool,
-    /// Photons emitted for the global map.
-    pub photons: u64,
-    /// Photons emitted for the caustic map.
-    pub caustic_photons: u64,
-    /// Photons in a density estimate.
-    pub nearest: usize,
-    /// Final-gather rays per camera sample; 0 shows the global map directly.
-    pub gather_rays: u32,
-    /// Shadow rays per camera sample at the first diffuse surface.
-    pub shadow_rays: u32,
+mod camera_pass;
+mod light_sampling;
+mod path;
+mod photon;
+mod settings;
+
+pub use camera_pass::{Region, camera_pass};
+pub use settings::IntegratorSettings;
+
+use crate::accel::Accelerator;
+use crate::effects::EffectSet;
+use crate::film::PixelSample;
+use crate::geometry::Ray;
+use crate::photons::PhotonMaps;
+use crate::sampling::Sampler;
+use crate::scene::Scene;
+use crate::stats::RayCounts;
+
+/// What integrators see.
+#[derive(Clone, Copy)]
+pub struct RenderContext<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its ray tracer.
+    pub accel: &'a dyn Accelerator,
+    /// The photon maps; empty for integrators that want none.
+    pub maps: &'a PhotonMaps,
+    /// The effects that are simulated.
+    pub effects: EffectSet,
+    /// What the integrator is told.
+    pub settings: &'a IntegratorSettings,
 }
 
-impl Default for IntegratorSettings {
-    fn default() -> Self {
-        Self {
-            seed: 0,
-            max_depth: None,
-            roulette: true,
-            photons: 1_000_000,
-            caustic_photons: 500_000,
-            nearest: 60,
-            gather_rays: 4,
-            shadow_rays: 2,
-        }
-    }
+/// Estimates radiance along camera rays.
+pub trait Integrator: Send + Sync {
+    /// Adds the sample of one camera ray to `out`; `scratch` is the calling thread's own.
+    fn sample(&self, ray: Ray, sampler: &mut Sampler, out: &mut PixelSample, scratch: &mut Scratch);
 }
+
+/// What a thread keeps between samples.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// Rays traced.
+    pub rays: RayCounts,
+    /// Space for nearest-neighbour searches.
+    pub nearest: crate::photons::map::Nearest,
+}
+
+/// An integrator that can be chosen.
+#[derive(Clone, Copy, Debug)]
+pub struct IntegratorEntry {
+    /// Name, for `--integrator`.
+    pub name: &'static str,
+    /// One sentence.
+    pub doc: &'static str,
+    /// Whether it reads photon maps.
+    pub photons: bool,
+    /// Makes it.
+    pub build: for<'a> fn(RenderContext<'a>) -> Box<dyn Integrator + 'a>,
+}
+
+crate::registry::impl_entry!(IntegratorEntry, "integrator");
+
+/// The integrators; the first is the default.
+pub static INTEGRATORS: &[IntegratorEntry] = &[photon::ENTRY, path::ENTRY];

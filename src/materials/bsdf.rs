@@ -141,6 +141,16 @@ impl Bsdf {
         self.lobes.iter().map(|(l, _)| l.albedo(self.wo)).sum()
     }
 
+    /// Probability that [`sample`](Self::sample) picks a diffuse lobe.
+    #[inline]
+    pub fn diffuse_probability(&self) -> f64 {
+        let diffuse = self
+            .lobes
+            .iter()
+            .filter(|(l, _)| l.class() == LobeClass::Diffuse);
+        diffuse.map(|(_, p)| p).sum::<f64>() / self.total
+    }
+
     /// The same point with only its diffuse lobes.
     #[inline]
     pub fn diffuse_only(&self) -> Self {

@@ -98,7 +98,14 @@ mod tests {
             let back = unpack(pack(v)).as_dvec3();
             assert!((v - back).length() < 1e-4, "{v} {back}");
         }
-        for v in [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z] {
+        for v in [
+            DVec3::X,
+            DVec3::Y,
+            DVec3::Z,
+            -DVec3::X,
+            -DVec3::Y,
+            -DVec3::Z,
+        ] {
             assert!((unpack(pack(v)).as_dvec3() - v).length() < 1e-6);
         }
         assert_eq!(size_of::<Photon>(), 36);

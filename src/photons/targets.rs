@@ -32,10 +32,16 @@ impl Cone {
         // A little wider than the sphere, so that rounding loses no direction.
         let r = s.radius * (1.0 + 1e-6);
         if d2 <= r * r {
-            return Self { axis: DVec3::Z, complement: 2.0 };
+            return Self {
+                axis: DVec3::Z,
+                complement: 2.0,
+            };
         }
         let sin2 = r * r / d2;
-        Self { axis: to / d2.sqrt(), complement: sin2 / (1.0 + (1.0 - sin2).sqrt()) }
+        Self {
+            axis: to / d2.sqrt(),
+            complement: sin2 / (1.0 + (1.0 - sin2).sqrt()),
+        }
     }
 
     fn holds(&self, dir: DVec3) -> bool {
@@ -56,7 +62,9 @@ impl Targets {
             })
             .map(|id| g.object_bounding_sphere(id))
             .collect();
-        Self { spheres: merge(spheres) }
+        Self {
+            spheres: merge(spheres),
+        }
     }
 
     /// Whether there is nothing to aim at.
@@ -72,7 +80,10 @@ impl Targets {
         let mut chosen = None;
         for s in &self.spheres {
             let cone = cones(s);
-            chosen = Some((cone, (rest / cone.complement).clamp(0.0, 1.0 - f64::EPSILON)));
+            chosen = Some((
+                cone,
+                (rest / cone.complement).clamp(0.0, 1.0 - f64::EPSILON),
+            ));
             if rest < cone.complement {
                 break;
             }
@@ -82,7 +93,12 @@ impl Targets {
         let local = warp::cone_from_complement([v, u[1]], cone.complement);
         let dir = Frame::from_normal(cone.axis).to_world(local);
         // The chosen cone holds it by construction; the others by test.
-        let overlap = self.spheres.iter().filter(|s| cones(s).holds(dir)).count().max(1);
+        let overlap = self
+            .spheres
+            .iter()
+            .filter(|s| cones(s).holds(dir))
+            .count()
+            .max(1);
         let pdf = overlap as f64 / (2.0 * std::f64::consts::PI * total);
         Some((dir, pdf))
     }
@@ -129,7 +145,9 @@ fn merge(mut spheres: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
             let c = || spheres.iter().map(|s| s.center[k]);
             c().fold(f64::NEG_INFINITY, f64::max) - c().fold(f64::INFINITY, f64::min)
         };
-        let axis = (0..3).max_by(|&a, &b| spread(a).total_cmp(&spread(b))).unwrap_or(0);
+        let axis = (0..3)
+            .max_by(|&a, &b| spread(a).total_cmp(&spread(b)))
+            .unwrap_or(0);
         spheres.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));
         spheres = spheres
             .chunks(2)
@@ -148,9 +166,18 @@ mod tests {
     fn directions_have_the_density_they_claim_also_where_cones_overlap() {
         let targets = Targets {
             spheres: vec![
-                BoundingSphere { center: DVec3::new(0.0, 0.0, 3.0), radius: 1.0 },
-                BoundingSphere { center: DVec3::new(0.8, 0.0, 3.0), radius: 0.7 },
-                BoundingSphere { center: DVec3::new(-4.0, 1.0, 0.0), radius: 0.5 },
+                BoundingSphere {
+                    center: DVec3::new(0.0, 0.0, 3.0),
+                    radius: 1.0,
+                },
+                BoundingSphere {
+                    center: DVec3::new(0.8, 0.0, 3.0),
+                    radius: 0.7,
+                },
+                BoundingSphere {
+                    center: DVec3::new(-4.0, 1.0, 0.0),
+                    radius: 0.5,
+                },
             ],
         };
         // E[1/pdf] is the solid angle of the union; compare with uniform directions.
@@ -158,12 +185,17 @@ mod tests {
         let n = 400_000;
         let (mut sum, mut sum2, mut inside) = (0.0, 0.0, 0u32);
         for _ in 0..n {
-            let (dir, pdf) = targets.sample_direction(DVec3::ZERO, rng.next_2d()).expect("some");
+            let (dir, pdf) = targets
+                .sample_direction(DVec3::ZERO, rng.next_2d())
+                .expect("some");
             assert!((dir.length() - 1.0).abs() < 1e-12);
             sum += 1.0 / pdf;
             sum2 += 1.0 / (pdf * pdf);
             let d = warp::sphere(rng.next_2d());
-            let hit = targets.spheres.iter().any(|s| Cone::new(s, DVec3::ZERO).holds(d));
+            let hit = targets
+                .spheres
+                .iter()
+                .any(|s| Cone::new(s, DVec3::ZERO).holds(d));
             inside += u32::from(hit);
         }
         let n = f64::from(n);
@@ -171,7 +203,10 @@ mod tests {
         let expected = 4.0 * std::f64::consts::PI * p;
         let sigma = ((sum2 / n - mean * mean) / n).sqrt()
             + 4.0 * std::f64::consts::PI * (p * (1.0 - p) / n).sqrt();
-        assert!((mean - expected).abs() < 4.0 * sigma, "{mean} {expected} ± {sigma}");
+        assert!(
+            (mean - expected).abs() < 4.0 * sigma,
+            "{mean} {expected} ± {sigma}"
+        );
     }
 
     #[test]
@@ -186,8 +221,11 @@ mod tests {
         let merged = merge(all.clone());
         assert!(merged.len() <= MAX_SPHERES);
         for s in &all {
-            assert!(merged.iter().any(|m| (s.center - m.center).length() + s.radius
-                <= m.radius * (1.0 + 1e-9)));
+            assert!(
+                merged
+                    .iter()
+                    .any(|m| (s.center - m.center).length() + s.radius <= m.radius * (1.0 + 1e-9))
+            );
         }
     }
 }

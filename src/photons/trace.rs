@@ -49,7 +49,12 @@ pub(super) fn run(
         Purpose::Caustic => "caustic photons",
     };
     let stage = control.stage(name, "photons", n);
-    let tracer = Tracer { scene, accel, purpose, settings };
+    let tracer = Tracer {
+        scene,
+        accel,
+        purpose,
+        settings,
+    };
     let batches: Vec<Batch> = (0..n.div_ceil(BATCH))
         .into_par_iter()
         .map(|b| {
@@ -76,7 +81,11 @@ pub(super) fn run(
         photons.extend_from_slice(&b.photons);
     }
     let counts = ledger.counts(photons.len() as u64);
-    Pass { photons, counts, rays }
+    Pass {
+        photons,
+        counts,
+        rays,
+    }
 }
 
 struct Tracer<'a> {
@@ -111,7 +120,10 @@ impl Tracer<'_> {
                 out.ledger.absorbed += power - left;
                 power = left;
             }
-            let mut bsdf = self.scene.material(sp.material).bsdf(&sp, TransportMode::Importance);
+            let mut bsdf = self
+                .scene
+                .material(sp.material)
+                .bsdf(&sp, TransportMode::Importance);
             let store = match self.purpose {
                 Purpose::Global => true,
                 Purpose::Caustic => class == PhotonClass::Caustic,

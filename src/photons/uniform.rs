@@ -32,7 +32,10 @@ impl PhotonSource for Uniform<'_> {
             None => leave(light, &mut sampler),
             Some(targets) => leave_toward(light, targets, self.scene, &mut sampler),
         }?;
-        Some(EmittedPhoton { power: photon.power / count as f64, ..photon })
+        Some(EmittedPhoton {
+            power: photon.power / count as f64,
+            ..photon
+        })
     }
 }
 
@@ -41,7 +44,10 @@ fn leave(light: &dyn Light, sampler: &mut Sampler) -> Option<EmittedPhoton> {
     let from = light.sample_origin(sampler.next_2d())?;
     let (dir, pdf) = light.sample_direction(&from, sampler.next_2d());
     let power = light.emitted(&from, dir) / (from.pdf_area * pdf);
-    (!power.is_black()).then(|| EmittedPhoton { ray: from.ray(dir), power })
+    (!power.is_black()).then(|| EmittedPhoton {
+        ray: from.ray(dir),
+        power,
+    })
 }
 
 /// As [`leave`], toward specular objects only.
@@ -57,12 +63,18 @@ fn leave_toward(
         let around = scene.bounds.bounding_sphere();
         let depth = (p - around.center).dot(distant.direction) + around.radius;
         let ray = Ray::new(p - distant.direction * depth.max(0.0), distant.direction);
-        return Some(EmittedPhoton { ray, power: distant.irradiance / pdf });
+        return Some(EmittedPhoton {
+            ray,
+            power: distant.irradiance / pdf,
+        });
     }
     let from = light.sample_origin(sampler.next_2d())?;
     let (dir, pdf) = targets.sample_direction(from.p, sampler.next_2d())?;
     let power = light.emitted(&from, dir) / (from.pdf_area * pdf);
-    (!power.is_black()).then(|| EmittedPhoton { ray: from.ray(dir), power })
+    (!power.is_black()).then(|| EmittedPhoton {
+        ray: from.ray(dir),
+        power,
+    })
 }
 
 /// Shares `count` among lights in proportion to flux; every light with flux gets at least one.
@@ -73,7 +85,11 @@ fn apportion(fluxes: &[f64], count: u64) -> Vec<u64> {
     let (mut acc, mut given) = (0.0, 0u64);
     for &f in fluxes {
         acc += f;
-        let until = if total > 0.0 { (acc / total * count as f64).round() as u64 } else { 0 };
+        let until = if total > 0.0 {
+            (acc / total * count as f64).round() as u64
+        } else {
+            0
+        };
         let mut n = until.saturating_sub(given);
         if f > 0.0 {
             n = n.max(1);
@@ -85,14 +101,33 @@ fn apportion(fluxes: &[f64], count: u64) -> Vec<u64> {
 }
 
 fn build<'a>(cx: &EmissionContext<'a>) -> Box<dyn PhotonSource + 'a> {
-    let fluxes: Vec<f64> = cx.scene.lights.iter().map(|l| l.power().luminance()).collect();
+    let fluxes: Vec<f64> = cx
+        .scene
+        .lights
+        .iter()
+        .map(|l| l.power().luminance())
+        .collect();
     let (stream, targets) = match cx.purpose {
         Purpose::Global => (stream::GLOBAL_PHOTONS, None),
         Purpose::Caustic => (stream::CAUSTIC_PHOTONS, Some(Targets::new(cx.scene))),
     };
-    let count = if targets.as_ref().is_some_and(Targets::is_empty) { 0 } else { cx.count };
-    let first = if count == 0 { vec![0] } else { apportion(&fluxes, count) };
-    Box::new(Uniform { scene: cx.scene, seed: cx.seed, stream, targets, first })
+    let count = if targets.as_ref().is_some_and(Targets::is_empty) {
+        0
+    } else {
+        cx.count
+    };
+    let first = if count == 0 {
+        vec![0]
+    } else {
+        apportion(&fluxes, count)
+    };
+    Box::new(Uniform {
+        scene: cx.scene,
+        seed: cx.seed,
+        stream,
+        targets,
+        first,
+    })
 }
 
 /// The table's line.

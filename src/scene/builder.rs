@@ -185,7 +185,7 @@ impl SceneBuilder {
         }
         Ok(Scene {
             choose_light: Discrete::new(lights.iter().map(|l| l.power().luminance())),
-            geometry,
+            geometry: Arc::new(geometry),
             materials,
             material_names,
             lights,

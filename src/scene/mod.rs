@@ -6,6 +6,8 @@ mod census;
 pub use builder::{Emission, MeshPlacement, SceneBuilder, ScenePlugins};
 pub use census::Census;
 
+use std::sync::Arc;
+
 use crate::cameras::CameraDesc;
 use crate::color::Rgb;
 use crate::geometry::{Geometry, LightId, MaterialId, Ray, SurfacePoint};
@@ -17,7 +19,7 @@ use crate::sampling::Discrete;
 /// Everything that is rendered.
 pub struct Scene {
     /// Shapes and their placements.
-    pub geometry: Geometry,
+    pub geometry: Arc<Geometry>,
     /// Materials, named by [`MaterialId`].
     pub materials: Vec<Box<dyn Material>>,
     /// Names of the materials, for reports.

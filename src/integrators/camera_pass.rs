@@ -1,0 +1,121 @@
+//! The camera pass: rays through pixels, in tiles, in passes over the whole image.
+//!
+//! Passes grow (1, 1, 2, 4, … samples), so that an image exists early whenever the run is
+//! stopped; a sample's random numbers depend on pixel and number alone, so the finished image
+//! does not depend on passes, tiles or threads.
+
+use rayon::prelude::*;
+
+use super::{Integrator, Scratch};
+use crate::cameras::Camera;
+use crate::control::Control;
+use crate::film::{Film, PixelSample, Tile};
+use crate::geometry::Ray;
+use crate::sampling::{Sampler, stream};
+use crate::stats::RayCounts;
+
+/// Edge of a tile in pixels.
+const TILE: u32 = 16;
+
+/// Samples of a tile that one task takes at most, so that a stop is heeded soon.
+const MAX_PASS: u32 = 64;
+
+/// The part of the image that is rendered: left, top, right, bottom in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// Left edge.
+    pub x0: u32,
+    /// Upper edge.
+    pub y0: u32,
+    /// Right edge, exclusive.
+    pub x1: u32,
+    /// Lower edge, exclusive.
+    pub y1: u32,
+}
+
+impl Region {
+    fn tiles(&self) -> Vec<(u32, u32, u32, u32)> {
+        let mut out = Vec::new();
+        for y in (self.y0..self.y1).step_by(TILE as usize) {
+            for x in (self.x0..self.x1).step_by(TILE as usize) {
+                out.push((x, y, TILE.min(self.x1 - x), TILE.min(self.y1 - y)));
+            }
+        }
+        out
+    }
+}
+
+/// Takes `spp` samples in every pixel of `region` and adds them to the film, until done or
+/// stopped. Returns the rays traced.
+pub fn camera_pass(
+    camera: &dyn Camera,
+    integrator: &dyn Integrator,
+    seed: u64,
+    spp: u32,
+    region: Region,
+    film: &mut Film,
+    control: &Control,
+) -> RayCounts {
+    let pixels = u64::from(region.x1 - region.x0) * u64::from(region.y1 - region.y0);
+    let stage = control.stage("pixels", "samples", pixels * u64::from(spp));
+    let tiles = region.tiles();
+    let (width, height) = (film.width(), film.height());
+    let mut rays = RayCounts::default();
+    let mut done = 0;
+    while done < spp && control.stopped().is_none() {
+        let samples = done.clamp(1, MAX_PASS).min(spp - done);
+        // Only as many tiles are held at a time as keep the threads busy.
+        for group in tiles.chunks(1024) {
+            let finished: Vec<Option<(Tile, RayCounts)>> = group
+                .par_iter()
+                .map(|&(x, y, w, h)| {
+                    if control.stopped().is_some() {
+                        return None;
+                    }
+                    let mut scratch = Scratch::default();
+                    let mut sums = Vec::with_capacity((w * h) as usize);
+                    for py in y..y + h {
+                        for px in x..x + w {
+                            let mut sum = PixelSample::default();
+                            let key = u64::from(py) * u64::from(width) + u64::from(px);
+                            for s in done..done + samples {
+                                let mut sampler =
+                                    Sampler::new(seed, stream::CAMERA, key, u64::from(s));
+                                let [jx, jy] = sampler.next_2d();
+                                let (o, d) = camera.ray(
+                                    (f64::from(px) + jx) / f64::from(width),
+                                    (f64::from(py) + jy) / f64::from(height),
+                                );
+                                integrator.sample(
+                                    Ray::new(o, d),
+                                    &mut sampler,
+                                    &mut sum,
+                                    &mut scratch,
+                                );
+                            }
+                            sums.push(sum);
+                        }
+                    }
+                    stage.advance(u64::from(w * h) * u64::from(samples));
+                    Some((
+                        Tile {
+                            x,
+                            y,
+                            width: w,
+                            height: h,
+                            sums,
+                            samples,
+                        },
+                        scratch.rays,
+                    ))
+                })
+                .collect();
+            for (tile, r) in finished.into_iter().flatten() {
+                film.add(&tile);
+                rays.add(&r);
+            }
+        }
+        done += samples;
+    }
+    rays
+}

@@ -1,0 +1,63 @@
+//! Next-event estimation: a sample of direct light at a surface point.
+
+use super::RenderContext;
+use crate::geometry::{LightId, Ray, SurfacePoint};
+use crate::materials::{Bsdf, BsdfValue};
+
+/// The power heuristic with exponent 2 (Veach 1997, 9.2.4) for `na` samples of density `a`
+/// against `nb` of density `b`.
+#[inline]
+pub(super) fn power_heuristic(na: f64, a: f64, nb: f64, b: f64) -> f64 {
+    let (x, y) = (na * a, nb * b);
+    // Scaled by the larger one: squares of densities would overflow near delta lobes.
+    if x >= y {
+        let r = y / x;
+        1.0 / (1.0 + r * r)
+    } else {
+        let r = x / y;
+        r * r / (1.0 + r * r)
+    }
+}
+
+/// A light's contribution at a point, and the ray that must reach it.
+pub(super) struct DirectSample {
+    /// `f·|cos|·L / pdf`, weighed against BSDF sampling, by lobe class.
+    pub(super) value: BsdfValue,
+    /// The shadow ray.
+    pub(super) ray: Ray,
+}
+
+/// Picks a light by flux and a point on it. `n_light` of these are taken against `n_bsdf`
+/// samples of the BSDF, whose hits on the light weigh against these; 0 if there are none.
+#[inline]
+pub(super) fn sample_direct(
+    cx: &RenderContext<'_>,
+    sp: &SurfacePoint,
+    bsdf: &Bsdf,
+    u: [f64; 2],
+    n_light: f64,
+    n_bsdf: f64,
+) -> Option<DirectSample> {
+    let (i, p_pick, rest) = cx.scene.choose_light.sample(u[0])?;
+    let light = cx.scene.light(LightId(i as u32));
+    let li = light.sample_li(sp.p, [rest, u[1]])?;
+    let pdf = li.pdf * p_pick;
+    let scale = 1.0 / (pdf * n_light);
+    let mut value = bsdf.eval(li.wi, |pdf_lobe| {
+        if li.delta || n_bsdf == 0.0 {
+            scale
+        } else {
+            power_heuristic(n_light, pdf, n_bsdf, pdf_lobe) * scale
+        }
+    });
+    if value.diffuse.is_black() && value.glossy.is_black() {
+        return None;
+    }
+    value.diffuse *= li.radiance;
+    value.glossy *= li.radiance;
+    let ray = match li.target {
+        Some(target) => sp.spawn_to(target),
+        None => sp.spawn(li.wi),
+    };
+    Some(DirectSample { value, ray })
+}

@@ -1,0 +1,389 @@
+//! `photon`: pass 2 of photon mapping (Jensen 1996; Namae and Makino 2002, section 2).
+//!
+//! From the camera a chain of specular surfaces is followed; at each diffuse surface on it
+//! - **direct** light comes by shadow rays,
+//! - **caustics** (`D S⁺ L`) from the caustic map,
+//! - **indirect** light (`D S* D …`) from the global map, seen by final-gather rays, or directly
+//!   with the photons that met another diffuse surface before.
+//!
+//! Every light path falls into exactly one of these. A gather ray that meets a light itself
+//! belongs to the direct light and is weighed against the shadow rays; one that meets a light
+//! by way of specular surfaces is left to the caustic map.
+
+use std::f64::consts::FRAC_1_PI;
+
+use super::light_sampling::{power_heuristic, sample_direct};
+use super::{Integrator, IntegratorEntry, RenderContext, Scratch};
+use crate::color::Rgb;
+use crate::effects::EffectSet;
+use crate::film::{Component, PixelSample};
+use crate::geometry::{Ray, SurfacePoint};
+use crate::materials::{Bsdf, LobeClass, TransportMode};
+use crate::math::DVec3;
+use crate::photons::PhotonClass;
+use crate::photons::map::Site;
+use crate::sampling::Sampler;
+
+/// Longest chain of specular surfaces.
+const CHAIN_GUARD: u32 = 256;
+
+/// Scattering events after which roulette may end a specular chain.
+const ROULETTE_DEPTH: u32 = 3;
+
+/// A gather ray shorter than this many kernel radii sees the kernel itself, as splotches in
+/// corners: there the path is followed one surface further instead.
+const NEAR: f64 = 2.0;
+
+/// How often a gather path may go one surface further.
+const NEAR_STEPS: u32 = 3;
+
+struct PhotonMapping<'a> {
+    cx: RenderContext<'a>,
+}
+
+/// A final-gather path at its next diffuse surface.
+struct Gathered {
+    sp: SurfacePoint,
+    bsdf: Bsdf,
+    beta: Rgb,
+}
+
+fn site(sp: &SurfacePoint) -> Site {
+    Site::new(sp.p, if sp.front { sp.ng } else { -sp.ng })
+}
+
+impl Integrator for PhotonMapping<'_> {
+    fn sample(
+        &self,
+        mut ray: Ray,
+        sampler: &mut Sampler,
+        out: &mut PixelSample,
+        scratch: &mut Scratch,
+    ) {
+        let cx = &self.cx;
+        let guard = cx.settings.max_depth.unwrap_or(CHAIN_GUARD);
+        let mut beta = Rgb::ONE;
+        let mut last: Option<(f64, DVec3)> = None;
+        let mut diffuse_seen = false;
+        scratch.rays.camera += 1;
+        for depth in 0.. {
+            let Some(hit) = cx.accel.intersect(&ray) else {
+                return;
+            };
+            let sp = cx.scene.surface_point(&ray, &hit);
+            let material = cx.scene.material(sp.material);
+            if let Some(t) = cx.scene.transmittance(&sp) {
+                beta *= t;
+            }
+            if depth == 0 {
+                out.alpha += 1.0;
+                out.albedo += material.albedo(&sp);
+                out.normal += sp.n;
+                out.position += sp.p + cx.scene.center;
+                out.depth += sp.distance;
+            }
+            if sp.light.is_some() {
+                let weight = last.map_or(1.0, |(pdf, from)| {
+                    power_heuristic(1.0, pdf, 1.0, cx.scene.pdf_light(from, &sp))
+                });
+                let component = if depth == 0 {
+                    Component::Direct
+                } else {
+                    Component::Specular
+                };
+                out.add(component, beta * cx.scene.emitted(&sp) * weight);
+            }
+            if depth >= guard {
+                return;
+            }
+            let bsdf = material.bsdf(&sp, TransportMode::Radiance);
+            if bsdf.has_diffuse() {
+                let first = (!diffuse_seen).then_some(());
+                diffuse_seen = true;
+                let part = self.diffuse(&sp, &bsdf, sampler, first, out, scratch);
+                for (component, radiance) in [
+                    (Component::Direct, part.direct),
+                    (Component::Caustics, part.caustics),
+                    (Component::Indirect, part.indirect),
+                ] {
+                    let to = if depth == 0 {
+                        component
+                    } else {
+                        Component::Specular
+                    };
+                    out.add(to, beta * radiance);
+                }
+            }
+            if !bsdf.has_specular() {
+                return;
+            }
+            let bsdf = bsdf.specular_only();
+            if bsdf.has_finite() {
+                let u = sampler.next_2d();
+                if let Some(direct) = sample_direct(cx, &sp, &bsdf, u, 1.0, 1.0) {
+                    scratch.rays.shadow += 1;
+                    if !cx.accel.occluded(&direct.ray) {
+                        out.add(Component::Specular, beta * direct.value.glossy);
+                    }
+                }
+            }
+            let u = sampler.next_2d();
+            let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
+                return;
+            };
+            beta *= s.weight;
+            last = (s.class != LobeClass::Delta).then_some((s.pdf, sp.p));
+            if cx.settings.roulette && depth + 1 >= ROULETTE_DEPTH {
+                let survive = beta.max_channel().min(0.95);
+                if sampler.next_1d() >= survive {
+                    return;
+                }
+                beta = beta / survive;
+            }
+            if beta.is_black() {
+                return;
+            }
+            ray = sp.spawn(s.wi);
+            scratch.rays.bounce += 1;
+        }
+    }
+}
+
+/// Light reflected by the diffuse lobes of a surface, by the way it came.
+#[derive(Default)]
+struct DiffuseLight {
+    direct: Rgb,
+    caustics: Rgb,
+    indirect: Rgb,
+}
+
+impl PhotonMapping<'_> {
+    /// Everything that the diffuse lobes at a point send back.
+    fn diffuse(
+        &self,
+        sp: &SurfacePoint,
+        full: &Bsdf,
+        sampler: &mut Sampler,
+        first: Option<()>,
+        out: &mut PixelSample,
+        scratch: &mut Scratch,
+    ) -> DiffuseLight {
+        let cx = &self.cx;
+        let filtered;
+        let bsdf = if full.has_specular() {
+            filtered = full.diffuse_only();
+            &filtered
+        } else {
+            full
+        };
+        let mut light = DiffuseLight::default();
+        let indirect = cx.effects.contains(EffectSet::INDIRECT);
+        let gather_rays = if indirect { cx.settings.gather_rays } else { 0 };
+        let n_gather = f64::from(gather_rays);
+
+        // Shadow rays.
+        let n_shadow = cx.settings.shadow_rays;
+        for _ in 0..n_shadow {
+            let u = sampler.next_2d();
+            let sampled = sample_direct(cx, sp, bsdf, u, f64::from(n_shadow), n_gather);
+            if let Some(direct) = sampled {
+                scratch.rays.shadow += 1;
+                if !cx.accel.occluded(&direct.ray) {
+                    light.direct += direct.value.diffuse;
+                }
+            }
+        }
+
+        // The caustic map.
+        let here = site(sp);
+        if let Some(map) = &cx.maps.caustic {
+            let e = map.estimate(
+                &here,
+                &mut scratch.nearest,
+                |_| true,
+                |wi| bsdf.diffuse_f(wi),
+            );
+            light.caustics += e.value;
+            if first.is_some() {
+                out.photons[1] += e.density;
+            }
+        }
+
+        // The global map: seen by gather rays, or directly.
+        if first.is_some() {
+            if let Some(s) = self.irradiance(&here, scratch) {
+                out.photons[0] += s.2;
+            }
+        }
+        if gather_rays == 0 {
+            if let Some(map) = &cx.maps.global {
+                let e = map.estimate(
+                    &here,
+                    &mut scratch.nearest,
+                    |class| class == PhotonClass::Indirect,
+                    |wi| bsdf.diffuse_f(wi),
+                );
+                light.indirect += e.value;
+                if first.is_some() {
+                    out.photons[0] += e.density;
+                }
+            }
+            return light;
+        }
+        let share = 1.0 / n_gather;
+        for _ in 0..gather_rays {
+            let u = sampler.next_2d();
+            let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
+                continue;
+            };
+            let ray = sp.spawn(s.wi);
+            scratch.rays.gather += 1;
+            let shadow = f64::from(n_shadow);
+            let mut seen = Rgb::ZERO;
+            let next = self.next_diffuse(ray, s.weight, sampler, scratch, |on, beta| {
+                let pdf_light = cx.scene.pdf_light(sp.p, on);
+                let weight = power_heuristic(n_gather, s.pdf, shadow, pdf_light);
+                seen = beta * cx.scene.emitted(on) * weight;
+            });
+            light.direct += seen * share;
+            if let Some(next) = next {
+                light.indirect += self.reflected(next, sampler, scratch, 0) * share;
+            }
+        }
+        light
+    }
+
+    /// Follows a ray along specular surfaces to the next diffuse one. `on_light` is called if
+    /// the ray meets a light before any surface.
+    fn next_diffuse(
+        &self,
+        mut ray: Ray,
+        mut beta: Rgb,
+        sampler: &mut Sampler,
+        scratch: &mut Scratch,
+        mut on_light: impl FnMut(&SurfacePoint, Rgb),
+    ) -> Option<Gathered> {
+        let cx = &self.cx;
+        for depth in 0..CHAIN_GUARD {
+            let hit = cx.accel.intersect(&ray)?;
+            let sp = cx.scene.surface_point(&ray, &hit);
+            if let Some(t) = cx.scene.transmittance(&sp) {
+                beta *= t;
+            }
+            if depth == 0 && sp.light.is_some() {
+                on_light(&sp, beta);
+            }
+            let bsdf = cx
+                .scene
+                .material(sp.material)
+                .bsdf(&sp, TransportMode::Radiance);
+            let diffuse = bsdf.has_diffuse();
+            if diffuse && !bsdf.has_specular() {
+                return Some(Gathered { sp, bsdf, beta });
+            }
+            // A surface of both kinds: one of them is followed, by its share.
+            let specular = if diffuse {
+                let p = bsdf.diffuse_probability();
+                if sampler.next_1d() < p {
+                    let bsdf = bsdf.diffuse_only();
+                    return Some(Gathered {
+                        sp,
+                        bsdf,
+                        beta: beta / p,
+                    });
+                }
+                beta = beta / (1.0 - p);
+                bsdf.specular_only()
+            } else {
+                bsdf
+            };
+            let s = specular.sample(sampler.next_1d(), sampler.next_2d())?;
+            beta *= s.weight;
+            let survive = beta.max_channel().min(1.0);
+            if depth >= ROULETTE_DEPTH {
+                if sampler.next_1d() >= survive {
+                    return None;
+                }
+                beta = beta / survive;
+            }
+            if beta.is_black() {
+                return None;
+            }
+            ray = sp.spawn(s.wi);
+            scratch.rays.gather += 1;
+        }
+        None
+    }
+
+    /// Radiance that a gather ray sees reflected at a diffuse surface, times its throughput.
+    fn reflected(
+        &self,
+        at: Gathered,
+        sampler: &mut Sampler,
+        scratch: &mut Scratch,
+        steps: u32,
+    ) -> Rgb {
+        let cx = &self.cx;
+        let here = site(&at.sp);
+        let Some((irradiance, radius, _)) = self.irradiance(&here, scratch) else {
+            return Rgb::ZERO;
+        };
+        if at.sp.distance >= NEAR * radius || steps >= NEAR_STEPS {
+            return at.beta
+                * match at.bsdf.as_lambert() {
+                    Some(albedo) => albedo * irradiance * FRAC_1_PI,
+                    None => self.density(&here, &at.bsdf, scratch),
+                };
+        }
+        // Too near: direct light and caustics here, the rest from one surface further.
+        let mut sum = Rgb::ZERO;
+        if let Some(direct) = sample_direct(cx, &at.sp, &at.bsdf, sampler.next_2d(), 1.0, 0.0) {
+            scratch.rays.shadow += 1;
+            if !cx.accel.occluded(&direct.ray) {
+                sum += direct.value.diffuse;
+            }
+        }
+        if let Some(map) = &cx.maps.caustic {
+            let f = |wi| at.bsdf.diffuse_f(wi);
+            sum += map.estimate(&here, &mut scratch.nearest, |_| true, f).value;
+        }
+        let u = sampler.next_2d();
+        if let Some(s) = at.bsdf.sample(sampler.next_1d(), u) {
+            let ray = at.sp.spawn(s.wi);
+            scratch.rays.gather += 1;
+            if let Some(next) = self.next_diffuse(ray, s.weight, sampler, scratch, |_, _| ()) {
+                sum += self.reflected(next, sampler, scratch, steps + 1);
+            }
+        }
+        at.beta * sum
+    }
+
+    /// Irradiance, kernel radius and photon density at a site.
+    fn irradiance(&self, here: &Site, scratch: &mut Scratch) -> Option<(Rgb, f64, f64)> {
+        let map = self.cx.maps.irradiance.as_ref()?;
+        let s = map.nearest(here, &mut scratch.nearest)?;
+        Some((s.irradiance(), f64::from(s.radius), f64::from(s.density)))
+    }
+
+    /// Radiance reflected by diffuse lobes that are not Lambert's, from all photons.
+    fn density(&self, here: &Site, bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
+        let Some(map) = &self.cx.maps.global else {
+            return Rgb::ZERO;
+        };
+        map.estimate(
+            here,
+            &mut scratch.nearest,
+            |_| true,
+            |wi| bsdf.diffuse_f(wi),
+        )
+        .value
+    }
+}
+
+/// The table's line.
+pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
+    name: "photon",
+    doc: "photon mapping: direct light by shadow rays, caustics and indirect light from photons",
+    photons: true,
+    build: |cx| Box::new(PhotonMapping { cx }),
+};

@@ -1,0 +1,182 @@
+//! Photon maps: photons in a tree, and what is estimated from them.
+
+mod irradiance;
+mod kdtree;
+mod nearest;
+
+pub use irradiance::{IrradianceMap, IrradianceSample};
+pub use kdtree::KdTree;
+pub use nearest::Nearest;
+
+use std::f64::consts::PI;
+
+use super::photon::{Photon, PhotonClass};
+use crate::color::Rgb;
+use crate::geometry::Shape;
+use crate::math::{DVec3, Vec3};
+use crate::scene::Scene;
+
+/// Cosine between normals up to which photons of one surface are taken for those of another.
+const NORMAL_AGREEMENT: f32 = 0.8;
+
+/// Height of the kernel over its radius: photons farther from the tangent plane lie on another
+/// surface. A surface curved with radius `R` leaves the plane by `r²/2R`, so a kernel smaller
+/// than half that radius is not clipped.
+const FLATNESS: f32 = 0.25;
+
+/// The search radius in units of the radius that would hold the wanted number of photons if
+/// they were spread evenly over the whole scene. Where even this finds too few, light is so
+/// weak that a fixed kernel serves.
+const REACH: f64 = 4.0;
+
+/// Where a density is estimated.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// Position.
+    pub p: Vec3,
+    /// Unit geometric normal on the side that is lit.
+    pub ng: Vec3,
+}
+
+impl Site {
+    /// The site at `p` on the side of `ng`.
+    #[inline]
+    pub fn new(p: DVec3, ng: DVec3) -> Self {
+        Self {
+            p: p.as_vec3(),
+            ng: ng.as_vec3(),
+        }
+    }
+
+    /// Whether a photon or sample at `q` with normal `n` belongs to the same side of the same
+    /// surface, for a kernel of squared radius `r2`: kernels never reach through a wall.
+    #[inline]
+    fn accepts(&self, q: [f32; 3], n: Vec3, r2: f32) -> bool {
+        let height = (Vec3::from(q) - self.p).dot(self.ng);
+        n.dot(self.ng) >= NORMAL_AGREEMENT && height * height <= FLATNESS * FLATNESS * r2
+    }
+}
+
+/// Photons in a tree.
+#[derive(Debug)]
+pub struct PhotonMap {
+    tree: KdTree,
+    photons: Vec<Photon>,
+    nearest: usize,
+    max_radius: f32,
+}
+
+/// What the photons near a site say.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Estimate {
+    /// Sum of `f(photon) · power`, over the kernel's area: radiance if `f` is a BSDF value,
+    /// irradiance if `f = 1`.
+    pub value: Rgb,
+    /// Photons per square metre.
+    pub density: f64,
+    /// Radius of the kernel in metres.
+    pub radius: f64,
+}
+
+impl PhotonMap {
+    /// Builds the map. `nearest` photons make an estimate; `area` is that of all surfaces in m².
+    pub fn build(mut photons: Vec<Photon>, nearest: usize, area: f64) -> Self {
+        let tree = KdTree::build(&mut photons, |p| p.p);
+        let even = (nearest as f64 * area / (PI * photons.len().max(1) as f64)).sqrt();
+        Self {
+            tree,
+            photons,
+            nearest: nearest.max(2),
+            max_radius: (REACH * even) as f32,
+        }
+    }
+
+    /// Number of photons.
+    pub fn len(&self) -> usize {
+        self.photons.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.photons.is_empty()
+    }
+
+    /// The photons, in the order of the tree.
+    pub fn photons(&self) -> &[Photon] {
+        &self.photons
+    }
+
+    /// Estimates a density at `site` over the photons that `keep` accepts, weighing each by
+    /// `f(wi)`; `found` is scratch space.
+    ///
+    /// With `k` nearest photons the kernel's radius is the distance to the `k`-th, which itself
+    /// is not counted: `Σ_{i<k} / (π r_k²)` is unbiased on uniform light, where counting it would
+    /// give a factor `k/(k−1)` too much. Where fewer than `k` lie within the search radius, all
+    /// of them are taken over the disc of that radius.
+    #[inline]
+    pub fn estimate(
+        &self,
+        site: &Site,
+        found: &mut Nearest,
+        keep: impl Fn(PhotonClass) -> bool,
+        f: impl Fn(DVec3) -> Rgb,
+    ) -> Estimate {
+        let max2 = self.max_radius * self.max_radius;
+        found.reset(self.nearest, max2);
+        self.tree.visit_near(site.p, found, |i, r2| {
+            let photon = &self.photons[i];
+            keep(photon.class) && site.accepts(photon.p, photon.ng(), r2)
+        });
+        let (full, r2) = found.kernel();
+        if found.len() == 0 {
+            return Estimate {
+                radius: f64::from(self.max_radius),
+                ..Default::default()
+            };
+        }
+        let mut sum = Rgb::ZERO;
+        let mut counted = 0u32;
+        for (i, d2) in found.iter() {
+            if full && d2 >= r2 {
+                continue;
+            }
+            let photon = &self.photons[i];
+            sum += f(photon.wi()) * photon.power();
+            counted += 1;
+        }
+        let inv_area = 1.0 / (PI * f64::from(r2).max(f64::MIN_POSITIVE));
+        Estimate {
+            value: sum * inv_area,
+            density: f64::from(counted) * inv_area,
+            radius: f64::from(r2).sqrt(),
+        }
+    }
+}
+
+/// Area of all surfaces in m², world space.
+pub fn surface_area(scene: &Scene) -> f64 {
+    let g = &scene.geometry;
+    g.objects
+        .iter()
+        .map(|o| {
+            let world = o.placement.map(|p| p.world_from_object);
+            match g.shape(o.shape) {
+                Shape::Mesh(m) => (0..m.indices.len() as u32)
+                    .map(|i| {
+                        let mut v = m.corners(i);
+                        if let Some(w) = &world {
+                            v = v.map(|p| w.transform_point3(p));
+                        }
+                        0.5 * (v[1] - v[0]).cross(v[2] - v[0]).length()
+                    })
+                    .sum::<f64>(),
+                Shape::Spheres(s) => {
+                    let scale = world.map_or(1.0, |w| w.matrix3.determinant().abs().cbrt());
+                    (0..s.spheres.len() as u32)
+                        .map(|i| 4.0 * PI * (s.get(i).1 * scale).powi(2))
+                        .sum()
+                }
+            }
+        })
+        .sum()
+}
