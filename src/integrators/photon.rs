@@ -4,7 +4,8 @@
 //! - **direct** light comes by shadow rays,
 //! - **caustics** (`D S⁺ L`) from the caustic map,
 //! - **indirect** light (`D S* D …`) from the global map, seen by final-gather rays, or directly
-//!   with the photons that met another diffuse surface before.
+//!   with the photons that met another diffuse surface before; with gather rays, the part
+//!   `D S* D S⁺ L` comes from the glow map instead, and what the rays see leaves it out.
 //!
 //! Every light path falls into exactly one of these. A gather ray that meets a light itself
 //! belongs to the direct light and is weighed against the shadow rays; one that meets a light
@@ -77,7 +78,6 @@ impl Integrator for PhotonMapping<'_> {
             }
             if depth == 0 {
                 out.alpha += 1.0;
-                out.albedo += material.albedo(&sp);
                 out.normal += sp.n;
                 out.position += sp.p + cx.scene.center;
                 out.depth += sp.distance;
@@ -93,10 +93,14 @@ impl Integrator for PhotonMapping<'_> {
                 };
                 out.add(component, beta * cx.scene.emitted(&sp) * weight);
             }
+            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
+            material.scatter(&sp, &mut bsdf);
+            if depth == 0 {
+                out.albedo += bsdf.albedo();
+            }
             if depth >= guard {
                 return;
             }
-            let bsdf = material.bsdf(&sp, TransportMode::Radiance);
             if bsdf.has_diffuse() {
                 let first = (!diffuse_seen).then_some(());
                 diffuse_seen = true;
@@ -230,6 +234,7 @@ impl PhotonMapping<'_> {
             }
             return light;
         }
+        light.indirect += self.glow(&here, bsdf, scratch);
         let share = 1.0 / n_gather;
         for _ in 0..gather_rays {
             let u = sampler.next_2d();
@@ -335,17 +340,14 @@ impl PhotonMapping<'_> {
                     None => self.density(&here, &at.bsdf, scratch),
                 };
         }
-        // Too near: direct light and caustics here, the rest from one surface further.
-        let mut sum = Rgb::ZERO;
+        // Too near: direct light and glow here, the rest from one surface further. (Caustics here
+        // are the glow of the surface that the gather ray left.)
+        let mut sum = self.glow(&here, &at.bsdf, scratch);
         if let Some(direct) = sample_direct(cx, &at.sp, &at.bsdf, sampler.next_2d(), 1.0, 0.0) {
             scratch.rays.shadow += 1;
             if !cx.accel.occluded(&direct.ray) {
                 sum += direct.value.diffuse;
             }
-        }
-        if let Some(map) = &cx.maps.caustic {
-            let f = |wi| at.bsdf.diffuse_f(wi);
-            sum += map.estimate(&here, &mut scratch.nearest, |_| true, f).value;
         }
         let u = sampler.next_2d();
         if let Some(s) = at.bsdf.sample(sampler.next_1d(), u) {
@@ -367,16 +369,26 @@ impl PhotonMapping<'_> {
 
     /// Radiance reflected by diffuse lobes that are not Lambert's, from all photons.
     fn density(&self, here: &Site, bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
-        let Some(map) = &self.cx.maps.global else {
+        let maps = self.cx.maps;
+        let Some(map) = &maps.global else {
             return Rgb::ZERO;
         };
-        map.estimate(
-            here,
-            &mut scratch.nearest,
-            |_| true,
-            |wi| bsdf.diffuse_f(wi),
-        )
-        .value
+        let all = maps.glow.is_none();
+        let keep = |class| all || class != PhotonClass::Caustic;
+        let f = |wi| bsdf.diffuse_f(wi);
+        map.estimate(here, &mut scratch.nearest, keep, f).value
+    }
+
+    /// Radiance reflected of the light that caustics on other surfaces shed here. Diffuse lobes
+    /// that are not Lambert's are taken by their albedo: this light comes from all around.
+    fn glow(&self, here: &Site, bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
+        let Some(map) = &self.cx.maps.glow else {
+            return Rgb::ZERO;
+        };
+        let Some(s) = map.nearest(here, &mut scratch.nearest) else {
+            return Rgb::ZERO;
+        };
+        bsdf.albedo() * s.irradiance() * FRAC_1_PI
     }
 }
 

@@ -5,7 +5,10 @@
 //! for any other:
 //! - the **global** map stores every photon that arrives at a diffuse surface, with its class:
 //!   `L D` (direct), `L S⁺ D` (caustic), or any path with an earlier D (indirect);
-//! - the **caustic** map stores `L S⁺ D` only, from photons sent toward specular objects alone.
+//! - the **caustic** map stores `L S⁺ D` only, from photons sent toward specular objects alone;
+//! - the **glow** map stores the same photons one diffuse surface further, `L S⁺ D S* D`: the
+//!   light that a caustic sheds on its surroundings. It is smooth where it arrives, but its
+//!   source is small and bright, which final-gather rays hit by chance only.
 //!
 //! Emission is a plugin family: one file and one line in [`EMISSIONS`].
 
@@ -55,6 +58,9 @@ pub struct PhotonMaps {
     pub irradiance: Option<IrradianceMap>,
     /// Photons that came by specular surfaces only.
     pub caustic: Option<PhotonMap>,
+    /// Irradiance from caustics one diffuse surface away; if present, the irradiance of the
+    /// global photons leaves those out that are caustic themselves.
+    pub glow: Option<IrradianceMap>,
     /// What became of the global photons.
     pub global_counts: PhotonCounts,
     /// What became of the caustic photons.
@@ -82,23 +88,30 @@ pub fn trace_photons(
         purpose,
         count,
     };
-    if effects.contains(EffectSet::INDIRECT) && settings.global > 0 {
-        let source = (emission.build)(&context(Purpose::Global, settings.global));
-        let pass = trace::run(scene, accel, &*source, Purpose::Global, settings, control);
-        maps.global_counts = pass.counts;
-        maps.rays.add(&pass.rays);
-        let map = PhotonMap::build(pass.photons, settings.nearest, area);
-        if gather {
-            maps.irradiance = Some(IrradianceMap::build(&map, control));
-        }
-        maps.global = Some(map);
-    }
+    let indirect = effects.contains(EffectSet::INDIRECT) && settings.global > 0;
     if effects.contains(EffectSet::CAUSTICS) && settings.caustic > 0 {
         let source = (emission.build)(&context(Purpose::Caustic, settings.caustic));
         let pass = trace::run(scene, accel, &*source, Purpose::Caustic, settings, control);
         maps.caustic_counts = pass.counts;
         maps.rays.add(&pass.rays);
         maps.caustic = Some(PhotonMap::build(pass.photons, settings.nearest, area));
+        if gather && indirect {
+            let glow = PhotonMap::build(pass.glow, settings.nearest, area);
+            maps.glow = Some(IrradianceMap::build(&glow, |_| true, control));
+        }
+    }
+    if indirect {
+        let source = (emission.build)(&context(Purpose::Global, settings.global));
+        let pass = trace::run(scene, accel, &*source, Purpose::Global, settings, control);
+        maps.global_counts = pass.counts;
+        maps.rays.add(&pass.rays);
+        let map = PhotonMap::build(pass.photons, settings.nearest, area);
+        if gather {
+            let all = maps.glow.is_none();
+            let keep = |class| all || class != PhotonClass::Caustic;
+            maps.irradiance = Some(IrradianceMap::build(&map, keep, control));
+        }
+        maps.global = Some(map);
     }
     maps
 }

@@ -8,7 +8,7 @@
 //! scrambling by hashing); the second Sobol' dimension is the Pascal matrix modulo two, applied
 //! as a butterfly (a Kronecker power of `[[1,1],[0,1]]`).
 
-use super::rng::{Rng, hash2, unit_u32};
+use super::rng::{GOLDEN, Rng, hash2, mix, unit_u32};
 
 /// Names of the independent streams of random numbers.
 pub mod stream {
@@ -53,7 +53,7 @@ impl Sampler {
     pub fn next_2d(&mut self) -> [f64; 2] {
         if self.pair < SOBOL_PAIRS {
             self.pair += 1;
-            let h = hash2(self.key, u64::from(self.pair));
+            let h = mix(self.key ^ u64::from(self.pair).wrapping_mul(GOLDEN));
             sobol_2d(self.index, h)
         } else {
             self.rng.next_2d()
