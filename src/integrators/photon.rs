@@ -15,6 +15,8 @@ use std::f64::consts::FRAC_1_PI;
 
 use super::light_sampling::{power_heuristic, sample_direct};
 use super::{Integrator, IntegratorEntry, RenderContext, Scratch};
+use arrayvec::ArrayVec;
+
 use crate::color::Rgb;
 use crate::effects::EffectSet;
 use crate::film::{Component, PixelSample};
@@ -42,6 +44,12 @@ struct PhotonMapping<'a> {
     cx: RenderContext<'a>,
 }
 
+/// Scattering events up to which a chain of smooth dielectrics is split rather than sampled.
+const SPLIT_DEPTH: u32 = 3;
+
+/// Most chains that wait: at each of the first events one branch goes on and the others wait.
+const MAX_CHAINS: usize = 3 * SPLIT_DEPTH as usize + 1;
+
 /// A final-gather path at its next diffuse surface.
 struct Gathered {
     sp: SurfacePoint,
@@ -53,21 +61,67 @@ fn site(sp: &SurfacePoint) -> Site {
     Site::new(sp.p, if sp.front { sp.ng } else { -sp.ng })
 }
 
+/// A specular chain from the camera, at its next segment.
+#[derive(Clone, Copy)]
+struct Chain {
+    ray: Ray,
+    beta: Rgb,
+    /// Scattering events so far.
+    depth: u32,
+    /// Density and origin of the last direction; none for a delta lobe or the camera.
+    last: Option<(f64, DVec3)>,
+}
+
 impl Integrator for PhotonMapping<'_> {
     fn sample(
         &self,
-        mut ray: Ray,
+        ray: Ray,
         sampler: &mut Sampler,
         out: &mut PixelSample,
         scratch: &mut Scratch,
     ) {
+        scratch.rays.camera += 1;
+        let mut pending = ArrayVec::<Chain, MAX_CHAINS>::new();
+        pending.push(Chain {
+            ray,
+            beta: Rgb::ONE,
+            depth: 0,
+            last: None,
+        });
+        let mut diffuse_seen = false;
+        while let Some(chain) = pending.pop() {
+            self.follow(
+                chain,
+                sampler,
+                out,
+                scratch,
+                &mut pending,
+                &mut diffuse_seen,
+            );
+        }
+    }
+}
+
+impl PhotonMapping<'_> {
+    /// Follows one chain to its end; where it splits, the other branch is left in `pending`.
+    fn follow(
+        &self,
+        chain: Chain,
+        sampler: &mut Sampler,
+        out: &mut PixelSample,
+        scratch: &mut Scratch,
+        pending: &mut ArrayVec<Chain, MAX_CHAINS>,
+        diffuse_seen: &mut bool,
+    ) {
         let cx = &self.cx;
         let guard = cx.settings.max_depth.unwrap_or(CHAIN_GUARD);
-        let mut beta = Rgb::ONE;
-        let mut last: Option<(f64, DVec3)> = None;
-        let mut diffuse_seen = false;
-        scratch.rays.camera += 1;
-        for depth in 0.. {
+        let Chain {
+            mut ray,
+            mut beta,
+            depth: start,
+            mut last,
+        } = chain;
+        for depth in start.. {
             let Some(hit) = cx.accel.intersect(&ray) else {
                 return;
             };
@@ -76,8 +130,11 @@ impl Integrator for PhotonMapping<'_> {
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
+            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
+            material.scatter(&sp, &mut bsdf);
             if depth == 0 {
                 out.alpha += 1.0;
+                out.albedo += bsdf.albedo();
                 out.normal += sp.n;
                 out.position += sp.p + cx.scene.center;
                 out.depth += sp.distance;
@@ -93,18 +150,13 @@ impl Integrator for PhotonMapping<'_> {
                 };
                 out.add(component, beta * cx.scene.emitted(&sp) * weight);
             }
-            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
-            material.scatter(&sp, &mut bsdf);
-            if depth == 0 {
-                out.albedo += bsdf.albedo();
-            }
             if depth >= guard {
                 return;
             }
             if bsdf.has_diffuse() {
-                let first = (!diffuse_seen).then_some(());
-                diffuse_seen = true;
-                let part = self.diffuse(&sp, &bsdf, sampler, first, out, scratch);
+                let first = !std::mem::replace(diffuse_seen, true);
+                let share = beta.max_channel().min(1.0);
+                let part = self.diffuse(&sp, &bsdf, share, sampler, first, out, scratch);
                 for (component, radiance) in [
                     (Component::Direct, part.direct),
                     (Component::Caustics, part.caustics),
@@ -122,6 +174,30 @@ impl Integrator for PhotonMapping<'_> {
                 return;
             }
             let bsdf = bsdf.specular_only();
+            if depth < SPLIT_DEPTH {
+                // Reflection and refraction are both followed: their shares are known exactly,
+                // and a rare bright reflection is the worst noise that glass has.
+                if let Some(mut branches) = bsdf.branches() {
+                    let Some(main) = branches.pop() else { return };
+                    for b in branches {
+                        let side = Chain {
+                            ray: sp.spawn(b.wi),
+                            beta: beta * b.weight,
+                            depth: depth + 1,
+                            last: None,
+                        };
+                        scratch.rays.bounce += 1;
+                        if pending.try_push(side).is_err() {
+                            debug_assert!(false, "more chains than splits allow");
+                        }
+                    }
+                    beta *= main.weight;
+                    last = None;
+                    ray = sp.spawn(main.wi);
+                    scratch.rays.bounce += 1;
+                    continue;
+                }
+            }
             if bsdf.has_finite() {
                 let u = sampler.next_2d();
                 if let Some(direct) = sample_direct(cx, &sp, &bsdf, u, 1.0, 1.0) {
@@ -162,13 +238,15 @@ struct DiffuseLight {
 }
 
 impl PhotonMapping<'_> {
-    /// Everything that the diffuse lobes at a point send back.
+    /// Everything that the diffuse lobes at a point send back. `share` is how much of it the
+    /// pixel sees: a faint branch gets fewer rays.
     fn diffuse(
         &self,
         sp: &SurfacePoint,
         full: &Bsdf,
+        share: f64,
         sampler: &mut Sampler,
-        first: Option<()>,
+        first: bool,
         out: &mut PixelSample,
         scratch: &mut Scratch,
     ) -> DiffuseLight {
@@ -182,11 +260,16 @@ impl PhotonMapping<'_> {
         };
         let mut light = DiffuseLight::default();
         let indirect = cx.effects.contains(EffectSet::INDIRECT);
-        let gather_rays = if indirect { cx.settings.gather_rays } else { 0 };
+        let rays = |n: u32| (f64::from(n) * share).ceil() as u32;
+        let gather_rays = if indirect {
+            rays(cx.settings.gather_rays)
+        } else {
+            0
+        };
         let n_gather = f64::from(gather_rays);
 
         // Shadow rays.
-        let n_shadow = cx.settings.shadow_rays;
+        let n_shadow = rays(cx.settings.shadow_rays);
         for _ in 0..n_shadow {
             let u = sampler.next_2d();
             let sampled = sample_direct(cx, sp, bsdf, u, f64::from(n_shadow), n_gather);
@@ -208,13 +291,13 @@ impl PhotonMapping<'_> {
                 |wi| bsdf.diffuse_f(wi),
             );
             light.caustics += e.value;
-            if first.is_some() {
+            if first {
                 out.photons[1] += e.density;
             }
         }
 
         // The global map: seen by gather rays, or directly.
-        if first.is_some() {
+        if first {
             if let Some(s) = self.irradiance(&here, scratch) {
                 out.photons[0] += s.2;
             }
@@ -228,7 +311,7 @@ impl PhotonMapping<'_> {
                     |wi| bsdf.diffuse_f(wi),
                 );
                 light.indirect += e.value;
-                if first.is_some() {
+                if first {
                     out.photons[0] += e.density;
                 }
             }

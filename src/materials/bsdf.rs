@@ -244,6 +244,33 @@ impl Bsdf {
             .sum()
     }
 
+    /// Every direction that the delta lobes send light to, if all lobes are deltas and there are
+    /// few; the weights are `f·|cos θi|`, without probabilities.
+    pub fn branches(&self) -> Option<ArrayVec<BsdfSample, 4>> {
+        let mut out = ArrayVec::new();
+        for (lobe, _) in &self.lobes {
+            if lobe.class() != LobeClass::Delta {
+                return None;
+            }
+            for s in lobe.branches(self.wo) {
+                let wi = self.frame.to_world(s.wi);
+                if !self.sides_agree(wi, s.wi) || s.weight.is_black() {
+                    continue;
+                }
+                let factor = self.transport_factor(wi, s.wi, lobe.eta());
+                out.try_push(BsdfSample {
+                    wi,
+                    weight: s.weight * factor,
+                    pdf: 0.0,
+                    class: LobeClass::Delta,
+                    transmitted: s.wi.z < 0.0,
+                })
+                .ok()?;
+            }
+        }
+        Some(out)
+    }
+
     /// Picks a lobe by `u_lobe` and a direction from it by `u`. `None` where nothing scatters.
     #[inline]
     pub fn sample(&self, u_lobe: f64, u: [f64; 2]) -> Option<BsdfSample> {
