@@ -45,6 +45,7 @@ pub mod error;
 pub mod ffi;
 pub mod film;
 pub mod geometry;
+pub mod import;
 pub mod integrators;
 pub mod lights;
 pub mod materials;
