@@ -34,8 +34,10 @@ fn encode(
     sink: &mut dyn Sink,
 ) -> io::Result<()> {
     let list = image.layers.iter().flat_map(channels).collect();
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Some(text(Metadata::SOFTWARE));
+    let mut attributes = LayerAttributes {
+        software_name: Some(text(Metadata::SOFTWARE)),
+        ..Default::default()
+    };
     let mut own = |name: &str, value| attributes.other.insert(text(name), value);
     own(
         "commit",
