@@ -14,7 +14,7 @@ mod node;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use crate::color::units::LightUnits;
+pub use crate::color::units::LightUnits;
 use crate::error::{Error, Result};
 use crate::materials::MaterialDesc;
 use crate::scene::{Scene, SceneBuilder, ScenePlugins};
