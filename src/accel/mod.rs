@@ -12,6 +12,7 @@
 //! - of several primitives at the same distance any one may be named, but always the same one
 //!   for the same ray.
 
+mod bvh;
 #[cfg(feature = "embree")]
 mod embree;
 mod linear;
@@ -63,5 +64,6 @@ crate::registry::impl_entry!(AcceleratorEntry, "accelerator");
 pub static ACCELERATORS: &[AcceleratorEntry] = &[
     #[cfg(feature = "embree")]
     embree::ENTRY,
+    bvh::ENTRY,
     linear::ENTRY,
 ];
