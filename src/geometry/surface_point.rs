@@ -3,7 +3,7 @@
 use super::object::Placement;
 use super::{Hit, Object, Ray, Shape, sphere, triangle};
 use crate::ad::V3;
-use crate::math::{DVec3, robust};
+use crate::math::{DVec3, larger, robust};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -81,14 +81,15 @@ impl SurfacePoint {
                 on
             }
         };
-        let wo = -d.normalize();
+        let (unit, length) = unit_and_length(d);
+        let wo = -unit;
         Self {
             p: on.p,
             ng: on.ng,
             n: if on.n.dot(on.ng) < 0.0 { -on.n } else { on.n },
             wo,
             front: wo.dot(on.ng) > 0.0,
-            distance: (on.p - o).length(),
+            distance: on.t * length,
             uv: on.uv,
             offset: robust::spawn_offset(on.p, on.center, on.size),
             prim: hit.prim,
@@ -123,8 +124,23 @@ impl SurfacePoint {
     }
 }
 
+/// `d` normalised, and its length. Directions that are unit up to their rounding to single
+/// precision, as nearly all are, need no square root: one Newton step leaves an error of 1e-13.
+#[inline]
+fn unit_and_length(d: DVec3) -> (DVec3, f64) {
+    let dd = d.dot(d);
+    let inv = if (dd - 1.0).abs() < 5e-7 {
+        1.5 - 0.5 * dd
+    } else {
+        1.0 / dd.sqrt()
+    };
+    (d * inv, dd * inv)
+}
+
 /// A refined point in the space of the shape.
 struct Refined {
+    /// Distance along the ray in units of its direction, which an affine map keeps.
+    t: f64,
     p: DVec3,
     ng: DVec3,
     n: DVec3,
@@ -133,7 +149,7 @@ struct Refined {
     size: f64,
 }
 
-#[inline]
+#[inline(always)]
 fn refine_local(
     o: DVec3,
     d: DVec3,
@@ -147,18 +163,24 @@ fn refine_local(
             let v = mesh.corners(prim);
             // A backend may report a hit an ulp outside, or on a triangle seen edge-on:
             // the point is kept on the triangle.
-            let (b1, b2) = match triangle::plane_hit(V3::<f64>::constant(o), V3::constant(d), v) {
-                Some(h) => clamp_barycentrics(h.b1, h.b2),
-                None => (1.0 / 3.0, 1.0 / 3.0),
-            };
             let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
-            let ng = e1.cross(e2).normalize();
+            let normal = e1.cross(e2);
+            let (o, d) = (V3::<f64>::constant(o), V3::constant(d));
+            let (t, b1, b2) = match triangle::plane_hit(o, d, v[0], e1, e2, normal) {
+                Some(h) => {
+                    let (b1, b2) = clamp_barycentrics(h.b1, h.b2);
+                    (h.t, b1, b2)
+                }
+                None => (t, 1.0 / 3.0, 1.0 / 3.0),
+            };
+            let ng = normal * (1.0 / normal.length_squared().sqrt());
             let n = mesh
                 .normal(prim, b1, b2)
                 .and_then(DVec3::try_normalize)
                 .unwrap_or(ng);
             let (center, size) = local_scale(place);
             Refined {
+                t,
                 p: v[0] + e1 * b1 + e2 * b2,
                 ng,
                 n,
@@ -184,6 +206,7 @@ fn refine_local(
             let n = (o + d * t - c).try_normalize().unwrap_or(DVec3::Z);
             let (center, size) = local_scale(place);
             Refined {
+                t,
                 p: c + n * r,
                 ng: n,
                 n,
@@ -205,7 +228,7 @@ fn local_scale(place: Option<&Placement>) -> (DVec3, f64) {
 
 #[inline]
 fn clamp_barycentrics(b1: f64, b2: f64) -> (f64, f64) {
-    let (b1, b2) = (b1.max(0.0), b2.max(0.0));
+    let (b1, b2) = (larger(b1, 0.0), larger(b2, 0.0));
     let sum = b1 + b2;
     if sum > 1.0 {
         (b1 / sum, b2 / sum)

@@ -42,13 +42,12 @@ pub(super) fn sample_direct(
     let light = cx.scene.light(LightId(i as u32));
     let li = light.sample_li(sp.p, [rest, u[1]])?;
     let pdf = li.pdf * p_pick;
-    let scale = 1.0 / (pdf * n_light);
+    let x = pdf * n_light;
+    let alone = li.delta || n_bsdf == 0.0;
     let mut value = bsdf.eval(li.wi, |pdf_lobe| {
-        if li.delta || n_bsdf == 0.0 {
-            scale
-        } else {
-            power_heuristic(n_light, pdf, n_bsdf, pdf_lobe) * scale
-        }
+        // The power heuristic x²/(x² + y²) over x, in one division.
+        let y = if alone { 0.0 } else { pdf_lobe * n_bsdf };
+        x / (x * x + y * y)
     });
     if value.diffuse.is_black() && value.glossy.is_black() {
         return None;

@@ -8,7 +8,7 @@ use super::{Integrator, IntegratorEntry, RenderContext, Scratch};
 use crate::color::Rgb;
 use crate::film::{Component, PixelSample};
 use crate::geometry::Ray;
-use crate::materials::{LobeClass, TransportMode};
+use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::sampling::Sampler;
 
 /// Scattering events after which roulette begins.
@@ -88,7 +88,6 @@ impl Integrator for Path<'_> {
             }
             if depth == 0 {
                 out.alpha += 1.0;
-                out.albedo += material.albedo(&sp);
                 out.normal += sp.n;
                 out.position += sp.p + cx.scene.center;
                 out.depth += sp.distance;
@@ -102,10 +101,14 @@ impl Integrator for Path<'_> {
                     out.add(walk.component(), beta * le * weight);
                 }
             }
+            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
+            material.scatter(&sp, &mut bsdf);
+            if depth == 0 {
+                out.albedo += bsdf.albedo();
+            }
             if depth >= max_depth {
                 break;
             }
-            let bsdf = material.bsdf(&sp, TransportMode::Radiance);
             if bsdf.has_finite() {
                 let u = sampler.next_2d();
                 if let Some(direct) = sample_direct(cx, &sp, &bsdf, u, 1.0, 1.0) {

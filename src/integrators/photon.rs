@@ -4,7 +4,8 @@
 //! - **direct** light comes by shadow rays,
 //! - **caustics** (`D S⁺ L`) from the caustic map,
 //! - **indirect** light (`D S* D …`) from the global map, seen by final-gather rays, or directly
-//!   with the photons that met another diffuse surface before.
+//!   with the photons that met another diffuse surface before; with gather rays, the part
+//!   `D S* D S⁺ L` comes from the glow map instead, and what the rays see leaves it out.
 //!
 //! Every light path falls into exactly one of these. A gather ray that meets a light itself
 //! belongs to the direct light and is weighed against the shadow rays; one that meets a light
@@ -14,6 +15,8 @@ use std::f64::consts::FRAC_1_PI;
 
 use super::light_sampling::{power_heuristic, sample_direct};
 use super::{Integrator, IntegratorEntry, RenderContext, Scratch};
+use arrayvec::ArrayVec;
+
 use crate::color::Rgb;
 use crate::effects::EffectSet;
 use crate::film::{Component, PixelSample};
@@ -41,6 +44,12 @@ struct PhotonMapping<'a> {
     cx: RenderContext<'a>,
 }
 
+/// Scattering events up to which a chain of smooth dielectrics is split rather than sampled.
+const SPLIT_DEPTH: u32 = 3;
+
+/// Most chains that wait: at each of the first events one branch goes on and the others wait.
+const MAX_CHAINS: usize = 3 * SPLIT_DEPTH as usize + 1;
+
 /// A final-gather path at its next diffuse surface.
 struct Gathered {
     sp: SurfacePoint,
@@ -52,21 +61,67 @@ fn site(sp: &SurfacePoint) -> Site {
     Site::new(sp.p, if sp.front { sp.ng } else { -sp.ng })
 }
 
+/// A specular chain from the camera, at its next segment.
+#[derive(Clone, Copy)]
+struct Chain {
+    ray: Ray,
+    beta: Rgb,
+    /// Scattering events so far.
+    depth: u32,
+    /// Density and origin of the last direction; none for a delta lobe or the camera.
+    last: Option<(f64, DVec3)>,
+}
+
 impl Integrator for PhotonMapping<'_> {
     fn sample(
         &self,
-        mut ray: Ray,
+        ray: Ray,
         sampler: &mut Sampler,
         out: &mut PixelSample,
         scratch: &mut Scratch,
     ) {
+        scratch.rays.camera += 1;
+        let mut pending = ArrayVec::<Chain, MAX_CHAINS>::new();
+        pending.push(Chain {
+            ray,
+            beta: Rgb::ONE,
+            depth: 0,
+            last: None,
+        });
+        let mut diffuse_seen = false;
+        while let Some(chain) = pending.pop() {
+            self.follow(
+                chain,
+                sampler,
+                out,
+                scratch,
+                &mut pending,
+                &mut diffuse_seen,
+            );
+        }
+    }
+}
+
+impl PhotonMapping<'_> {
+    /// Follows one chain to its end; where it splits, the other branch is left in `pending`.
+    fn follow(
+        &self,
+        chain: Chain,
+        sampler: &mut Sampler,
+        out: &mut PixelSample,
+        scratch: &mut Scratch,
+        pending: &mut ArrayVec<Chain, MAX_CHAINS>,
+        diffuse_seen: &mut bool,
+    ) {
         let cx = &self.cx;
         let guard = cx.settings.max_depth.unwrap_or(CHAIN_GUARD);
-        let mut beta = Rgb::ONE;
-        let mut last: Option<(f64, DVec3)> = None;
-        let mut diffuse_seen = false;
-        scratch.rays.camera += 1;
-        for depth in 0.. {
+        let Chain {
+            mut ray,
+            mut beta,
+            depth: start,
+            mut last,
+        } = chain;
+        for depth in start.. {
             let Some(hit) = cx.accel.intersect(&ray) else {
                 return;
             };
@@ -75,9 +130,11 @@ impl Integrator for PhotonMapping<'_> {
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
+            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
+            material.scatter(&sp, &mut bsdf);
             if depth == 0 {
                 out.alpha += 1.0;
-                out.albedo += material.albedo(&sp);
+                out.albedo += bsdf.albedo();
                 out.normal += sp.n;
                 out.position += sp.p + cx.scene.center;
                 out.depth += sp.distance;
@@ -96,11 +153,10 @@ impl Integrator for PhotonMapping<'_> {
             if depth >= guard {
                 return;
             }
-            let bsdf = material.bsdf(&sp, TransportMode::Radiance);
             if bsdf.has_diffuse() {
-                let first = (!diffuse_seen).then_some(());
-                diffuse_seen = true;
-                let part = self.diffuse(&sp, &bsdf, sampler, first, out, scratch);
+                let first = !std::mem::replace(diffuse_seen, true);
+                let share = beta.max_channel().min(1.0);
+                let part = self.diffuse(&sp, &bsdf, share, sampler, first, out, scratch);
                 for (component, radiance) in [
                     (Component::Direct, part.direct),
                     (Component::Caustics, part.caustics),
@@ -118,6 +174,30 @@ impl Integrator for PhotonMapping<'_> {
                 return;
             }
             let bsdf = bsdf.specular_only();
+            if depth < SPLIT_DEPTH {
+                // Reflection and refraction are both followed: their shares are known exactly,
+                // and a rare bright reflection is the worst noise that glass has.
+                if let Some(mut branches) = bsdf.branches() {
+                    let Some(main) = branches.pop() else { return };
+                    for b in branches {
+                        let side = Chain {
+                            ray: sp.spawn(b.wi),
+                            beta: beta * b.weight,
+                            depth: depth + 1,
+                            last: None,
+                        };
+                        scratch.rays.bounce += 1;
+                        if pending.try_push(side).is_err() {
+                            debug_assert!(false, "more chains than splits allow");
+                        }
+                    }
+                    beta *= main.weight;
+                    last = None;
+                    ray = sp.spawn(main.wi);
+                    scratch.rays.bounce += 1;
+                    continue;
+                }
+            }
             if bsdf.has_finite() {
                 let u = sampler.next_2d();
                 if let Some(direct) = sample_direct(cx, &sp, &bsdf, u, 1.0, 1.0) {
@@ -158,13 +238,15 @@ struct DiffuseLight {
 }
 
 impl PhotonMapping<'_> {
-    /// Everything that the diffuse lobes at a point send back.
+    /// Everything that the diffuse lobes at a point send back. `share` is how much of it the
+    /// pixel sees: a faint branch gets fewer rays.
     fn diffuse(
         &self,
         sp: &SurfacePoint,
         full: &Bsdf,
+        share: f64,
         sampler: &mut Sampler,
-        first: Option<()>,
+        first: bool,
         out: &mut PixelSample,
         scratch: &mut Scratch,
     ) -> DiffuseLight {
@@ -178,11 +260,16 @@ impl PhotonMapping<'_> {
         };
         let mut light = DiffuseLight::default();
         let indirect = cx.effects.contains(EffectSet::INDIRECT);
-        let gather_rays = if indirect { cx.settings.gather_rays } else { 0 };
+        let rays = |n: u32| (f64::from(n) * share).ceil() as u32;
+        let gather_rays = if indirect {
+            rays(cx.settings.gather_rays)
+        } else {
+            0
+        };
         let n_gather = f64::from(gather_rays);
 
         // Shadow rays.
-        let n_shadow = cx.settings.shadow_rays;
+        let n_shadow = rays(cx.settings.shadow_rays);
         for _ in 0..n_shadow {
             let u = sampler.next_2d();
             let sampled = sample_direct(cx, sp, bsdf, u, f64::from(n_shadow), n_gather);
@@ -204,13 +291,13 @@ impl PhotonMapping<'_> {
                 |wi| bsdf.diffuse_f(wi),
             );
             light.caustics += e.value;
-            if first.is_some() {
+            if first {
                 out.photons[1] += e.density;
             }
         }
 
         // The global map: seen by gather rays, or directly.
-        if first.is_some() {
+        if first {
             if let Some(s) = self.irradiance(&here, scratch) {
                 out.photons[0] += s.2;
             }
@@ -224,12 +311,13 @@ impl PhotonMapping<'_> {
                     |wi| bsdf.diffuse_f(wi),
                 );
                 light.indirect += e.value;
-                if first.is_some() {
+                if first {
                     out.photons[0] += e.density;
                 }
             }
             return light;
         }
+        light.indirect += self.glow(&here, bsdf, scratch);
         let share = 1.0 / n_gather;
         for _ in 0..gather_rays {
             let u = sampler.next_2d();
@@ -335,17 +423,14 @@ impl PhotonMapping<'_> {
                     None => self.density(&here, &at.bsdf, scratch),
                 };
         }
-        // Too near: direct light and caustics here, the rest from one surface further.
-        let mut sum = Rgb::ZERO;
+        // Too near: direct light and glow here, the rest from one surface further. (Caustics here
+        // are the glow of the surface that the gather ray left.)
+        let mut sum = self.glow(&here, &at.bsdf, scratch);
         if let Some(direct) = sample_direct(cx, &at.sp, &at.bsdf, sampler.next_2d(), 1.0, 0.0) {
             scratch.rays.shadow += 1;
             if !cx.accel.occluded(&direct.ray) {
                 sum += direct.value.diffuse;
             }
-        }
-        if let Some(map) = &cx.maps.caustic {
-            let f = |wi| at.bsdf.diffuse_f(wi);
-            sum += map.estimate(&here, &mut scratch.nearest, |_| true, f).value;
         }
         let u = sampler.next_2d();
         if let Some(s) = at.bsdf.sample(sampler.next_1d(), u) {
@@ -367,16 +452,26 @@ impl PhotonMapping<'_> {
 
     /// Radiance reflected by diffuse lobes that are not Lambert's, from all photons.
     fn density(&self, here: &Site, bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
-        let Some(map) = &self.cx.maps.global else {
+        let maps = self.cx.maps;
+        let Some(map) = &maps.global else {
             return Rgb::ZERO;
         };
-        map.estimate(
-            here,
-            &mut scratch.nearest,
-            |_| true,
-            |wi| bsdf.diffuse_f(wi),
-        )
-        .value
+        let all = maps.glow.is_none();
+        let keep = |class| all || class != PhotonClass::Caustic;
+        let f = |wi| bsdf.diffuse_f(wi);
+        map.estimate(here, &mut scratch.nearest, keep, f).value
+    }
+
+    /// Radiance reflected of the light that caustics on other surfaces shed here. Diffuse lobes
+    /// that are not Lambert's are taken by their albedo: this light comes from all around.
+    fn glow(&self, here: &Site, bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
+        let Some(map) = &self.cx.maps.glow else {
+            return Rgb::ZERO;
+        };
+        let Some(s) = map.nearest(here, &mut scratch.nearest) else {
+            return Rgb::ZERO;
+        };
+        bsdf.albedo() * s.irradiance() * FRAC_1_PI
     }
 }
 

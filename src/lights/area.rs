@@ -53,7 +53,7 @@ impl Light for AreaLight {
         if !(d2 > 0.0) {
             return None;
         }
-        let wi = to / d2.sqrt();
+        let wi = to * (1.0 / d2.sqrt());
         let cos = -wi.dot(tri.ng);
         if cos == 0.0 || (cos < 0.0 && !self.double_sided) {
             return None;

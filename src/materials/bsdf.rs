@@ -172,7 +172,7 @@ impl Bsdf {
 
     /// The factor that makes `f` adjoint: η² for refracted radiance, and the correction for
     /// shading normals when importance is transported (Veach 1997, 5.2 and 5.3.2).
-    #[inline]
+    #[inline(always)]
     fn transport_factor(&self, wi: DVec3, wi_local: DVec3, eta: f64) -> f64 {
         match self.mode {
             TransportMode::Radiance => {
@@ -199,11 +199,18 @@ impl Bsdf {
 
     /// `f·|cos θi|` toward the unit direction `wi`, each lobe multiplied by
     /// `weight(pdf of that lobe)`; the pdf includes the probability of picking the lobe.
-    #[inline]
+    #[inline(always)]
     pub fn eval(&self, wi: DVec3, weight: impl Fn(f64) -> f64) -> BsdfValue {
         let mut out = BsdfValue::default();
         let local = self.frame.to_local(wi);
         if !self.sides_agree(wi, local) {
+            return out;
+        }
+        // By far the commonest surface needs neither loop nor dispatch.
+        if let [(Lobe::Lambert(lobe), _)] = self.lobes.as_slice() {
+            let (f, pdf) = lobe.eval(self.wo, local);
+            let factor = self.transport_factor(wi, local, 1.0);
+            out.diffuse = f * (local.z * factor * weight(pdf));
             return out;
         }
         for (lobe, pick) in &self.lobes {
@@ -216,7 +223,12 @@ impl Bsdf {
                 continue;
             }
             let factor = self.transport_factor(wi, local, lobe.eta());
-            let value = f * (local.z.abs() * factor * weight(pdf * pick / self.total));
+            let pdf = if self.lobes.len() == 1 {
+                pdf
+            } else {
+                pdf * pick / self.total
+            };
+            let value = f * (local.z.abs() * factor * weight(pdf));
             match class {
                 LobeClass::Diffuse => out.diffuse += value,
                 _ => out.glossy += value,
@@ -239,23 +251,53 @@ impl Bsdf {
             .sum()
     }
 
+    /// Every direction that the delta lobes send light to, if all lobes are deltas and there are
+    /// few; the weights are `f·|cos θi|`, without probabilities.
+    pub fn branches(&self) -> Option<ArrayVec<BsdfSample, 4>> {
+        let mut out = ArrayVec::new();
+        for (lobe, _) in &self.lobes {
+            if lobe.class() != LobeClass::Delta {
+                return None;
+            }
+            for s in lobe.branches(self.wo) {
+                let wi = self.frame.to_world(s.wi);
+                if !self.sides_agree(wi, s.wi) || s.weight.is_black() {
+                    continue;
+                }
+                let factor = self.transport_factor(wi, s.wi, lobe.eta());
+                out.try_push(BsdfSample {
+                    wi,
+                    weight: s.weight * factor,
+                    pdf: 0.0,
+                    class: LobeClass::Delta,
+                    transmitted: s.wi.z < 0.0,
+                })
+                .ok()?;
+            }
+        }
+        Some(out)
+    }
+
     /// Picks a lobe by `u_lobe` and a direction from it by `u`. `None` where nothing scatters.
     #[inline]
     pub fn sample(&self, u_lobe: f64, u: [f64; 2]) -> Option<BsdfSample> {
-        let mut rest = u_lobe * self.total;
         let (last, firsts) = self.lobes.split_last()?;
-        let mut chosen = last;
-        for entry in firsts {
-            if rest < entry.1 {
-                chosen = entry;
-                break;
+        let (mut lobe, mut p_lobe, mut u_in) = (&last.0, 1.0, u_lobe);
+        if !firsts.is_empty() {
+            let mut rest = u_lobe * self.total;
+            let mut chosen = last;
+            for entry in firsts {
+                if rest < entry.1 {
+                    chosen = entry;
+                    break;
+                }
+                rest -= entry.1;
             }
-            rest -= entry.1;
+            lobe = &chosen.0;
+            p_lobe = chosen.1 / self.total;
+            // Within the lobe, what is left of u_lobe is uniform again.
+            u_in = (rest / chosen.1).clamp(0.0, 1.0 - f64::EPSILON);
         }
-        let (lobe, pick) = chosen;
-        let p_lobe = pick / self.total;
-        // Within the lobe, what is left of u_lobe is uniform again.
-        let u_in = (rest / pick).clamp(0.0, 1.0 - f64::EPSILON);
         let s = lobe.sample(self.wo, u_in, u)?;
         let wi = self.frame.to_world(s.wi);
         if !self.sides_agree(wi, s.wi) {
@@ -264,7 +306,11 @@ impl Bsdf {
         let factor = self.transport_factor(wi, s.wi, lobe.eta());
         Some(BsdfSample {
             wi,
-            weight: s.weight * (factor / p_lobe),
+            weight: if p_lobe == 1.0 {
+                s.weight * factor
+            } else {
+                s.weight * (factor / p_lobe)
+            },
             pdf: s.pdf * p_lobe,
             class: lobe.class(),
             transmitted: s.wi.z < 0.0,

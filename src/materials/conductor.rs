@@ -2,7 +2,7 @@
 
 use super::fresnel::Schlick;
 use super::lobes::GgxReflection;
-use super::{Bsdf, Material, MaterialDesc, MaterialEntry, MaterialTraits, TransportMode};
+use super::{Bsdf, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::geometry::SurfacePoint;
 
 struct Conductor {
@@ -11,10 +11,8 @@ struct Conductor {
 
 impl Material for Conductor {
     #[inline]
-    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
-        let mut bsdf = Bsdf::new(sp, mode);
+    fn scatter(&self, _sp: &SurfacePoint, bsdf: &mut Bsdf) {
         bsdf.push(self.lobe);
-        bsdf
     }
 
     fn traits(&self) -> MaterialTraits {

@@ -2,7 +2,7 @@
 //! transmission 1; solid with `KHR_materials_volume`, thin-walled without.
 
 use super::lobes::{GgxDielectric, Lobe, SmoothDielectric, ThinDielectric};
-use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits, TransportMode};
+use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
 use crate::geometry::SurfacePoint;
 
@@ -72,10 +72,8 @@ struct DielectricMaterial {
 
 impl Material for DielectricMaterial {
     #[inline]
-    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
-        let mut bsdf = Bsdf::new(sp, mode);
+    fn scatter(&self, sp: &SurfacePoint, bsdf: &mut Bsdf) {
         bsdf.push(self.interface.lobe(sp.front));
-        bsdf
     }
 
     fn traits(&self) -> MaterialTraits {

@@ -2,7 +2,7 @@
 //! `KHR_materials_specular` factor 0.
 
 use super::lobes::Lambert;
-use super::{Bsdf, Material, MaterialEntry, MaterialTraits, TransportMode};
+use super::{Bsdf, Material, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
 use crate::geometry::SurfacePoint;
 
@@ -12,12 +12,10 @@ struct LambertMaterial {
 
 impl Material for LambertMaterial {
     #[inline]
-    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
-        let mut bsdf = Bsdf::new(sp, mode);
+    fn scatter(&self, _sp: &SurfacePoint, bsdf: &mut Bsdf) {
         bsdf.push(Lambert {
             albedo: self.albedo,
         });
-        bsdf
     }
 
     fn traits(&self) -> MaterialTraits {

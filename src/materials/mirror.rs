@@ -2,7 +2,7 @@
 
 use super::fresnel::Schlick;
 use super::lobes::SmoothReflection;
-use super::{Bsdf, Material, MaterialDesc, MaterialEntry, MaterialTraits, TransportMode};
+use super::{Bsdf, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::geometry::SurfacePoint;
 
 struct Mirror {
@@ -11,12 +11,10 @@ struct Mirror {
 
 impl Material for Mirror {
     #[inline]
-    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
-        let mut bsdf = Bsdf::new(sp, mode);
+    fn scatter(&self, _sp: &SurfacePoint, bsdf: &mut Bsdf) {
         bsdf.push(SmoothReflection {
             fresnel: self.fresnel,
         });
-        bsdf
     }
 
     fn traits(&self) -> MaterialTraits {

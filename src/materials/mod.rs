@@ -27,8 +27,15 @@ use crate::geometry::SurfacePoint;
 
 /// What a surface is made of.
 pub trait Material: Send + Sync {
+    /// Pushes the lobes at a point, seen from `sp.wo`.
+    fn scatter(&self, sp: &SurfacePoint, bsdf: &mut Bsdf);
+
     /// The scattering function at a point, seen from `sp.wo`.
-    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf;
+    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
+        let mut bsdf = Bsdf::new(sp, mode);
+        self.scatter(sp, &mut bsdf);
+        bsdf
+    }
 
     /// What it can do at all; the survey of effects relies on it, so it may promise too much
     /// but never too little.
@@ -37,11 +44,6 @@ pub trait Material: Send + Sync {
     /// The medium behind its front face, if it encloses one that absorbs.
     fn interior(&self) -> Option<Interior> {
         None
-    }
-
-    /// Directional-hemispherical reflectance for display, linear RGB.
-    fn albedo(&self, sp: &SurfacePoint) -> crate::color::Rgb {
-        self.bsdf(sp, TransportMode::Radiance).albedo()
     }
 }
 

@@ -4,7 +4,7 @@
 use super::dielectric::Interface;
 use super::fresnel::Schlick;
 use super::lobes::{CoatedLambert, GgxReflection, Lobe, SmoothReflection};
-use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits, TransportMode};
+use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
 use crate::geometry::SurfacePoint;
 
@@ -21,8 +21,7 @@ struct Pbr {
 
 impl Material for Pbr {
     #[inline]
-    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
-        let mut bsdf = Bsdf::new(sp, mode);
+    fn scatter(&self, sp: &SurfacePoint, bsdf: &mut Bsdf) {
         bsdf.push(CoatedLambert {
             albedo: self.diffuse,
             layer: self.layer,
@@ -39,7 +38,6 @@ impl Material for Pbr {
         if let Some(interface) = &self.interface {
             bsdf.push(interface.lobe(sp.front));
         }
-        bsdf
     }
 
     fn traits(&self) -> MaterialTraits {

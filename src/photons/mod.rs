@@ -5,7 +5,10 @@
 //! for any other:
 //! - the **global** map stores every photon that arrives at a diffuse surface, with its class:
 //!   `L D` (direct), `L S⁺ D` (caustic), or any path with an earlier D (indirect);
-//! - the **caustic** map stores `L S⁺ D` only, from photons sent toward specular objects alone.
+//! - the **caustic** map stores `L S⁺ D` only, from photons sent toward specular objects alone;
+//! - the **glow** map stores the same photons one diffuse surface further, `L S⁺ D S* D`: the
+//!   light that a caustic sheds on its surroundings. It is smooth where it arrives, but its
+//!   source is small and bright, which final-gather rays hit by chance only.
 //!
 //! Emission is a plugin family: one file and one line in [`EMISSIONS`].
 
@@ -22,6 +25,8 @@ pub use ledger::Ledger;
 pub use map::{IrradianceMap, PhotonMap};
 pub use photon::{Photon, PhotonClass};
 pub use targets::Targets;
+
+use std::time::Instant;
 
 use crate::accel::Accelerator;
 use crate::control::Control;
@@ -55,12 +60,19 @@ pub struct PhotonMaps {
     pub irradiance: Option<IrradianceMap>,
     /// Photons that came by specular surfaces only.
     pub caustic: Option<PhotonMap>,
+    /// Irradiance from caustics one diffuse surface away; if present, the irradiance of the
+    /// global photons leaves those out that are caustic themselves.
+    pub glow: Option<IrradianceMap>,
     /// What became of the global photons.
     pub global_counts: PhotonCounts,
     /// What became of the caustic photons.
     pub caustic_counts: PhotonCounts,
     /// Rays traced.
     pub rays: RayCounts,
+    /// Seconds spent emitting and following photons.
+    pub tracing: f64,
+    /// Seconds spent building maps and estimating irradiance.
+    pub building: f64,
 }
 
 /// Emits, follows and stores photons, and builds the maps that `effects` call for.
@@ -82,23 +94,36 @@ pub fn trace_photons(
         purpose,
         count,
     };
-    if effects.contains(EffectSet::INDIRECT) && settings.global > 0 {
-        let source = (emission.build)(&context(Purpose::Global, settings.global));
-        let pass = trace::run(scene, accel, &*source, Purpose::Global, settings, control);
-        maps.global_counts = pass.counts;
+    let run = |purpose, count, maps: &mut PhotonMaps| {
+        let start = Instant::now();
+        let source = (emission.build)(&context(purpose, count));
+        let pass = trace::run(scene, accel, &*source, purpose, settings, control);
         maps.rays.add(&pass.rays);
+        maps.tracing += start.elapsed().as_secs_f64();
+        pass
+    };
+    let start = Instant::now();
+    let indirect = effects.contains(EffectSet::INDIRECT) && settings.global > 0;
+    if effects.contains(EffectSet::CAUSTICS) && settings.caustic > 0 {
+        let pass = run(Purpose::Caustic, settings.caustic, &mut maps);
+        maps.caustic_counts = pass.counts;
+        maps.caustic = Some(PhotonMap::build(pass.photons, settings.nearest, area));
+        if gather && indirect {
+            let glow = PhotonMap::build(pass.glow, settings.nearest, area);
+            maps.glow = Some(IrradianceMap::build(&glow, |_| true, control));
+        }
+    }
+    if indirect {
+        let pass = run(Purpose::Global, settings.global, &mut maps);
+        maps.global_counts = pass.counts;
         let map = PhotonMap::build(pass.photons, settings.nearest, area);
         if gather {
-            maps.irradiance = Some(IrradianceMap::build(&map, control));
+            let all = maps.glow.is_none();
+            let keep = |class| all || class != PhotonClass::Caustic;
+            maps.irradiance = Some(IrradianceMap::build(&map, keep, control));
         }
         maps.global = Some(map);
     }
-    if effects.contains(EffectSet::CAUSTICS) && settings.caustic > 0 {
-        let source = (emission.build)(&context(Purpose::Caustic, settings.caustic));
-        let pass = trace::run(scene, accel, &*source, Purpose::Caustic, settings, control);
-        maps.caustic_counts = pass.counts;
-        maps.rays.add(&pass.rays);
-        maps.caustic = Some(PhotonMap::build(pass.photons, settings.nearest, area));
-    }
+    maps.building = start.elapsed().as_secs_f64() - maps.tracing;
     maps
 }

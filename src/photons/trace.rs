@@ -8,7 +8,7 @@ use super::photon::{Photon, PhotonClass};
 use super::{EmittedPhoton, PhotonSettings};
 use crate::accel::Accelerator;
 use crate::control::Control;
-use crate::materials::{LobeClass, TransportMode};
+use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::sampling::{Rng, hash2, stream};
 use crate::scene::Scene;
 use crate::stats::{PhotonCounts, RayCounts};
@@ -22,6 +22,8 @@ const DEPTH_GUARD: u32 = 4096;
 /// Photons of one purpose, in the order of emission.
 pub(super) struct Pass {
     pub(super) photons: Vec<Photon>,
+    /// Caustic photons one diffuse surface further: `L S⁺ D S* D`.
+    pub(super) glow: Vec<Photon>,
     pub(super) counts: PhotonCounts,
     pub(super) rays: RayCounts,
 }
@@ -30,6 +32,7 @@ pub(super) struct Pass {
 #[derive(Default)]
 struct Batch {
     photons: Vec<Photon>,
+    glow: Vec<Photon>,
     ledger: Ledger,
     segments: u64,
 }
@@ -75,7 +78,9 @@ pub(super) fn run(
     let mut ledger = Ledger::default();
     let mut rays = RayCounts::default();
     let mut photons = Vec::with_capacity(batches.iter().map(|b| b.photons.len()).sum());
+    let mut glow = Vec::with_capacity(batches.iter().map(|b| b.glow.len()).sum());
     for b in batches {
+        glow.extend_from_slice(&b.glow);
         ledger.add(&b.ledger);
         rays.photon += b.segments;
         photons.extend_from_slice(&b.photons);
@@ -83,6 +88,7 @@ pub(super) fn run(
     let counts = ledger.counts(photons.len() as u64);
     Pass {
         photons,
+        glow,
         counts,
         rays,
     }
@@ -120,26 +126,28 @@ impl Tracer<'_> {
                 out.ledger.absorbed += power - left;
                 power = left;
             }
-            let mut bsdf = self
-                .scene
-                .material(sp.material)
-                .bsdf(&sp, TransportMode::Importance);
-            let store = match self.purpose {
-                Purpose::Global => true,
-                Purpose::Caustic => class == PhotonClass::Caustic,
-            };
-            if store && bsdf.has_diffuse() {
+            let mut bsdf = Bsdf::new(&sp, TransportMode::Importance);
+            self.scene.material(sp.material).scatter(&sp, &mut bsdf);
+            if bsdf.has_diffuse() {
                 let ng = if sp.front { sp.ng } else { -sp.ng };
-                out.photons.push(Photon::new(sp.p, sp.wo, ng, power, class));
-            }
-            if self.purpose == Purpose::Caustic && bsdf.has_diffuse() {
-                if !bsdf.has_specular() {
-                    // The end of a caustic; before any specular surface, of no use at all.
-                    out.ledger.cut += power;
-                    out.ledger.discarded += u64::from(class == PhotonClass::Direct);
-                    return;
+                let photon = Photon::new(sp.p, sp.wo, ng, power, class);
+                match (self.purpose, class) {
+                    (Purpose::Global, _) | (Purpose::Caustic, PhotonClass::Caustic) => {
+                        out.photons.push(photon);
+                    }
+                    (Purpose::Caustic, PhotonClass::Indirect) => out.glow.push(photon),
+                    (Purpose::Caustic, PhotonClass::Direct) => {}
                 }
-                bsdf = bsdf.specular_only();
+                // A caustic photon needs a specular surface before its first diffuse one, and
+                // stops at its second.
+                if self.purpose == Purpose::Caustic && class != PhotonClass::Caustic {
+                    if !bsdf.has_specular() {
+                        out.ledger.cut += power;
+                        out.ledger.discarded += u64::from(class == PhotonClass::Direct);
+                        return;
+                    }
+                    bsdf = bsdf.specular_only();
+                }
             }
             if depth >= max_depth {
                 out.ledger.cut += power;

@@ -5,6 +5,8 @@
 pub struct Discrete {
     /// Cumulative weights, normalised to end at 1; empty if the total is zero.
     cdf: Vec<f64>,
+    /// One over each probability.
+    inverse: Vec<f64>,
     total: f64,
 }
 
@@ -29,7 +31,14 @@ impl Discrete {
         } else {
             cdf.clear();
         }
-        Self { cdf, total: sum }
+        let inverse = (0..cdf.len())
+            .map(|i| 1.0 / (cdf[i] - if i == 0 { 0.0 } else { cdf[i - 1] }))
+            .collect();
+        Self {
+            cdf,
+            inverse,
+            total: sum,
+        }
     }
 
     /// Sum of the weights.
@@ -53,19 +62,28 @@ impl Discrete {
     /// `None` for an empty distribution.
     #[inline]
     pub fn sample(&self, u: f64) -> Option<(usize, f64, f64)> {
-        if self.cdf.is_empty() {
-            return None;
+        match self.cdf.len() {
+            0 => return None,
+            1 => return Some((0, 1.0, u)),
+            _ => {}
         }
         let i = if self.cdf.len() <= 8 {
-            // Faster than bisection for the few entries of most scenes.
-            self.cdf.iter().take_while(|&&c| c <= u).count()
+            // Faster than bisection for the few entries of most scenes; counting all of them
+            // leaves no branch to mispredict.
+            self.cdf.iter().map(|&c| usize::from(c <= u)).sum()
         } else {
             self.cdf.partition_point(|&c| c <= u)
         }
         .min(self.cdf.len() - 1);
         let lo = if i == 0 { 0.0 } else { self.cdf[i - 1] };
         let p = self.cdf[i] - lo;
-        (p > 0.0).then(|| (i, p, ((u - lo) / p).clamp(0.0, 1.0 - f64::EPSILON)))
+        (p > 0.0).then(|| {
+            (
+                i,
+                p,
+                ((u - lo) * self.inverse[i]).clamp(0.0, 1.0 - f64::EPSILON),
+            )
+        })
     }
 }
 

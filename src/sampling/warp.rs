@@ -2,31 +2,26 @@
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
-use crate::math::DVec3;
+use crate::math::{DVec3, larger};
 
-/// Sine and cosine for `|x| ≤ π/4`, absolute error below 1e-15 (Taylor series to x¹⁷).
+/// Sine and cosine for `|x| ≤ π/4`, absolute error below 1e-13 (Taylor series to x¹⁵), summed in
+/// pairs so that the multiplications overlap.
 ///
 /// Several times faster than the general functions, whose argument reduction is not needed here.
 #[inline]
 fn sin_cos_octant(x: f64) -> (f64, f64) {
     let x2 = x * x;
-    let s = x
-        * (1.0
-            + x2 * (-1.0 / 6.0
-                + x2 * (1.0 / 120.0
-                    + x2 * (-1.0 / 5040.0
-                        + x2 * (1.0 / 362_880.0
-                            + x2 * (-1.0 / 39_916_800.0
-                                + x2 * (1.0 / 6_227_020_800.0 - x2 / 1_307_674_368_000.0)))))));
-    let c = 1.0
-        + x2 * (-0.5
-            + x2 * (1.0 / 24.0
-                + x2 * (-1.0 / 720.0
-                    + x2 * (1.0 / 40_320.0
-                        + x2 * (-1.0 / 3_628_800.0
-                            + x2 * (1.0 / 479_001_600.0
-                                + x2 * (-1.0 / 87_178_291_200.0 + x2 / 20_922_789_888_000.0)))))));
-    (s, c)
+    let x4 = x2 * x2;
+    let x8 = x4 * x4;
+    let s = (1.0 - x2 * (1.0 / 6.0))
+        + x4 * (1.0 / 120.0 - x2 * (1.0 / 5040.0))
+        + x8 * ((1.0 / 362_880.0 - x2 * (1.0 / 39_916_800.0))
+            + x4 * (1.0 / 6_227_020_800.0 - x2 * (1.0 / 1_307_674_368_000.0)));
+    let c = (1.0 - x2 * (1.0 / 2.0))
+        + x4 * (1.0 / 24.0 - x2 * (1.0 / 720.0))
+        + x8 * ((1.0 / 40_320.0 - x2 * (1.0 / 3_628_800.0))
+            + x4 * (1.0 / 479_001_600.0 - x2 * (1.0 / 87_178_291_200.0)));
+    (x * s, c)
 }
 
 /// Uniform point of the unit disc, by the concentric map of Shirley and Chiu (1997).
@@ -37,12 +32,15 @@ pub fn disc(u: [f64; 2]) -> [f64; 2] {
     if a == 0.0 && b == 0.0 {
         return [0.0, 0.0];
     }
-    if a.abs() > b.abs() {
-        let (s, c) = sin_cos_octant(FRAC_PI_4 * (b / a));
-        [a * c, a * s]
+    // Which octant is a coin toss that no processor predicts: selects, not branches.
+    let wide = a.abs() > b.abs();
+    let (r, other) = if wide { (a, b) } else { (b, a) };
+    let (s, c) = sin_cos_octant(FRAC_PI_4 * (other / r));
+    let (along, across) = (r * c, r * s);
+    if wide {
+        [along, across]
     } else {
-        let (s, c) = sin_cos_octant(FRAC_PI_4 * (a / b));
-        [b * s, b * c]
+        [across, along]
     }
 }
 
@@ -50,13 +48,13 @@ pub fn disc(u: [f64; 2]) -> [f64; 2] {
 #[inline]
 pub fn cosine_hemisphere(u: [f64; 2]) -> DVec3 {
     let [x, y] = disc(u);
-    DVec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
+    DVec3::new(x, y, larger(1.0 - x * x - y * y, 0.0).sqrt())
 }
 
 /// Density `cos θ / π` in solid angle.
 #[inline]
 pub fn cosine_hemisphere_pdf(cos_theta: f64) -> f64 {
-    cos_theta.max(0.0) * FRAC_1_PI
+    larger(cos_theta, 0.0) * FRAC_1_PI
 }
 
 /// Uniform direction of the unit sphere; density `1/4π`.
@@ -96,13 +94,8 @@ pub fn cone_pdf(one_minus_cos_max: f64) -> f64 {
 /// Source: Heitz, *A Low-Distortion Map Between Triangle and Square*, 2019.
 #[inline]
 pub fn triangle(u: [f64; 2]) -> [f64; 2] {
-    if u[0] > u[1] {
-        let y = 0.5 * u[1];
-        [u[0] - y, y]
-    } else {
-        let x = 0.5 * u[0];
-        [x, u[1] - x]
-    }
+    let m = 0.5 * u[0].min(u[1]);
+    [u[0] - m, u[1] - m]
 }
 
 #[cfg(test)]
@@ -115,7 +108,7 @@ mod tests {
             let x = f64::from(i) / 1000.0 * FRAC_PI_4;
             let (s, c) = sin_cos_octant(x);
             assert!(
-                (s - x.sin()).abs() < 1e-15 && (c - x.cos()).abs() < 1e-15,
+                (s - x.sin()).abs() < 1e-13 && (c - x.cos()).abs() < 1e-13,
                 "{x}"
             );
         }

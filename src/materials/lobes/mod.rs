@@ -47,6 +47,9 @@ pub struct LobeSample {
     pub pdf: f64,
 }
 
+/// The directions of a delta lobe: reflected and refracted at most.
+pub type Branches = arrayvec::ArrayVec<LobeSample, 2>;
+
 /// What every lobe answers.
 pub trait LobeModel {
     /// Its class.
@@ -56,12 +59,34 @@ pub trait LobeModel {
     fn eval(&self, wo: DVec3, wi: DVec3) -> (Rgb, f64);
     /// A direction chosen by `u`; `u_pick` decides between branches (reflect or refract).
     fn sample(&self, wo: DVec3, u_pick: f64, u: [f64; 2]) -> Option<LobeSample>;
+    /// Every direction of a delta lobe, with `f·|cos θi|` (no probability in it); empty for others.
+    fn branches(&self, _wo: DVec3) -> Branches {
+        Branches::new()
+    }
     /// Directional albedo, possibly approximate: used to pick lobes and for display.
     fn albedo(&self, wo: DVec3) -> Rgb;
     /// Index beyond the surface over index on the side of `wo`, for lobes that refract.
     fn eta(&self) -> f64 {
         1.0
     }
+}
+
+/// One of several branches, in proportion to its weight.
+#[inline]
+fn pick(branches: Branches, u: f64) -> Option<LobeSample> {
+    let total: f64 = branches.iter().map(|b| b.weight.max_channel()).sum();
+    let mut rest = u * total;
+    for b in branches {
+        let w = b.weight.max_channel();
+        if rest < w {
+            return Some(LobeSample {
+                weight: b.weight * (total / w),
+                ..b
+            });
+        }
+        rest -= w;
+    }
+    None
 }
 
 /// A lobe defined outside this crate.
@@ -76,6 +101,9 @@ impl LobeModel for CustomLobe {
     }
     fn sample(&self, wo: DVec3, u_pick: f64, u: [f64; 2]) -> Option<LobeSample> {
         (**self).sample(wo, u_pick, u)
+    }
+    fn branches(&self, wo: DVec3) -> Branches {
+        (**self).branches(wo)
     }
     fn albedo(&self, wo: DVec3) -> Rgb {
         (**self).albedo(wo)
@@ -115,6 +143,9 @@ macro_rules! lobes {
             #[inline]
             fn sample(&self, wo: DVec3, u_pick: f64, u: [f64; 2]) -> Option<LobeSample> {
                 match self { $(Self::$name(l) => l.sample(wo, u_pick, u),)* }
+            }
+            fn branches(&self, wo: DVec3) -> Branches {
+                match self { $(Self::$name(l) => l.branches(wo),)* }
             }
             #[inline]
             fn albedo(&self, wo: DVec3) -> Rgb {

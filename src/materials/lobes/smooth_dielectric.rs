@@ -1,6 +1,6 @@
 //! Reflection and refraction by a smooth interface.
 
-use super::{LobeClass, LobeModel, LobeSample};
+use super::{Branches, LobeClass, LobeModel, LobeSample, pick};
 use crate::color::Rgb;
 use crate::materials::fresnel;
 use crate::math::DVec3;
@@ -29,22 +29,28 @@ impl LobeModel for SmoothDielectric {
 
     #[inline]
     fn sample(&self, wo: DVec3, u_pick: f64, _u: [f64; 2]) -> Option<LobeSample> {
+        pick(self.branches(wo), u_pick)
+    }
+
+    #[inline]
+    fn branches(&self, wo: DVec3) -> Branches {
         let f = fresnel::dielectric(wo.z, self.eta);
+        let mut out = Branches::new();
+        out.push(LobeSample {
+            wi: DVec3::new(-wo.x, -wo.y, wo.z),
+            weight: Rgb::splat(f.reflectance),
+            pdf: 0.0,
+        });
         let through = f.transmittance * self.transmission;
-        let p_reflect = f.reflectance / (f.reflectance + through);
-        if u_pick < p_reflect {
-            return Some(LobeSample {
-                wi: DVec3::new(-wo.x, -wo.y, wo.z),
-                weight: Rgb::splat(f.reflectance + through),
+        if through > 0.0 {
+            let inv = 1.0 / self.eta;
+            out.push(LobeSample {
+                wi: DVec3::new(-wo.x * inv, -wo.y * inv, -f.cos_t).normalize(),
+                weight: self.tint * through,
                 pdf: 0.0,
             });
         }
-        let inv = 1.0 / self.eta;
-        Some(LobeSample {
-            wi: DVec3::new(-wo.x * inv, -wo.y * inv, -f.cos_t).normalize(),
-            weight: self.tint * (f.reflectance + through),
-            pdf: 0.0,
-        })
+        out
     }
 
     #[inline]

@@ -1,6 +1,6 @@
 //! Mirror reflection.
 
-use super::{LobeClass, LobeModel, LobeSample};
+use super::{Branches, LobeClass, LobeModel, LobeSample};
 use crate::color::Rgb;
 use crate::materials::fresnel::Schlick;
 use crate::math::DVec3;
@@ -25,11 +25,16 @@ impl LobeModel for SmoothReflection {
 
     #[inline]
     fn sample(&self, wo: DVec3, _u_pick: f64, _u: [f64; 2]) -> Option<LobeSample> {
-        Some(LobeSample {
+        self.branches(wo).pop()
+    }
+
+    #[inline]
+    fn branches(&self, wo: DVec3) -> Branches {
+        Branches::from_iter([LobeSample {
             wi: DVec3::new(-wo.x, -wo.y, wo.z),
             weight: self.fresnel.at(wo.z),
             pdf: 0.0,
-        })
+        }])
     }
 
     #[inline]

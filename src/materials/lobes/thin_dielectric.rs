@@ -1,6 +1,6 @@
 //! Thin-walled transmission: a pane with two parallel interfaces, which bends nothing.
 
-use super::{LobeClass, LobeModel, LobeSample};
+use super::{Branches, LobeClass, LobeModel, LobeSample, pick};
 use crate::color::Rgb;
 use crate::materials::fresnel;
 use crate::math::DVec3;
@@ -42,19 +42,24 @@ impl LobeModel for ThinDielectric {
 
     #[inline]
     fn sample(&self, wo: DVec3, u_pick: f64, _u: [f64; 2]) -> Option<LobeSample> {
+        pick(self.branches(wo), u_pick)
+    }
+
+    #[inline]
+    fn branches(&self, wo: DVec3) -> Branches {
         let (r, t) = self.split(wo.z);
-        if u_pick * (r + t) < r {
-            return Some(LobeSample {
+        Branches::from_iter([
+            LobeSample {
                 wi: DVec3::new(-wo.x, -wo.y, wo.z),
-                weight: Rgb::splat(r + t),
+                weight: Rgb::splat(r),
                 pdf: 0.0,
-            });
-        }
-        Some(LobeSample {
-            wi: -wo,
-            weight: self.tint * (r + t),
-            pdf: 0.0,
-        })
+            },
+            LobeSample {
+                wi: -wo,
+                weight: self.tint * t,
+                pdf: 0.0,
+            },
+        ])
     }
 
     #[inline]

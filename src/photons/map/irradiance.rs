@@ -9,6 +9,7 @@ use super::{KdTree, Nearest, PhotonMap, Site};
 use crate::color::Rgb;
 use crate::control::Control;
 use crate::math::Vec3;
+use crate::photons::PhotonClass;
 
 /// One photon in this many gets an irradiance.
 const STRIDE: usize = 4;
@@ -45,8 +46,13 @@ pub struct IrradianceMap {
 }
 
 impl IrradianceMap {
-    /// Estimates irradiance at every fourth photon of `map`, over all its photons.
-    pub fn build(map: &PhotonMap, control: &Control) -> Self {
+    /// Estimates irradiance at every fourth photon of `map`, over the photons that `keep`
+    /// accepts.
+    pub fn build(
+        map: &PhotonMap,
+        keep: impl Fn(PhotonClass) -> bool + Sync,
+        control: &Control,
+    ) -> Self {
         let sites = map.photons().len().div_ceil(STRIDE);
         let stage = control.stage("irradiance", "estimates", sites as u64);
         let mut samples: Vec<IrradianceSample> = map
@@ -62,7 +68,7 @@ impl IrradianceMap {
                             p: Vec3::from(photon.p),
                             ng: photon.ng(),
                         };
-                        let e = map.estimate(&site, &mut found, |_| true, |_| Rgb::ONE);
+                        let e = map.estimate(&site, &mut found, &keep, |_| Rgb::ONE);
                         IrradianceSample {
                             p: photon.p,
                             ng: site.ng.into(),
