@@ -1,4 +1,5 @@
 //! Files as others find them: EXR read by an independent reader, atomic writing.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod openexr;
 
@@ -182,6 +183,17 @@ fn damaged_files_are_refused() {
         .iter()
         .map(|n| whole[..*n].to_vec())
         .collect();
+    // Windows that no memory would hold.
+    for name in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
+        let mut bytes = whole.clone();
+        let at = bytes
+            .windows(name.len())
+            .position(|w| w == name.as_bytes())
+            .unwrap();
+        let corner = at + name.len() + 4 + 8;
+        bytes[corner..corner + 8].copy_from_slice(&[0xff, 0xff, 0x0f, 0, 0xff, 0xff, 0x0f, 0]);
+        bad.push(bytes);
+    }
     bad.push(b"\x89PNG\r\n\x1a\n".to_vec());
     for bytes in bad {
         fs::write(&path, &bytes).unwrap();

@@ -58,15 +58,10 @@ impl Plan {
     /// Names that no plugin has, extensions that no format has, options that contradict one
     /// another.
     pub fn new(args: &RenderArgs, registry: &Registry) -> Result<Self> {
-        if let Some(name) = &args.integrator {
-            registry.integrators.find(name)?;
-        }
-        if let Some(name) = &args.accel {
-            registry.accelerators.find(name)?;
-        }
-        if let Some(name) = &args.emission {
-            registry.emissions.find(name)?;
-        }
+        // The defaults get their names here, for the reports.
+        let integrator = registry.integrators.choose(args.integrator.as_deref())?;
+        let accelerator = registry.accelerators.choose(args.accel.as_deref())?;
+        let emission = registry.emissions.choose(args.emission.as_deref())?;
         let effects = args.effects.clone().unwrap_or_else(|| "auto".into());
         check_effects(&effects, registry)?;
         for path in &args.outputs {
@@ -88,9 +83,9 @@ impl Plan {
             quiet: args.quiet,
             size: args.size,
             settings: RenderSettings {
-                integrator: args.integrator.clone(),
-                accelerator: args.accel.clone(),
-                emission: args.emission.clone(),
+                integrator: Some(integrator.name.into()),
+                accelerator: Some(accelerator.name.into()),
+                emission: Some(emission.name.into()),
                 effects,
                 width: 0,
                 height: 0,
@@ -203,9 +198,13 @@ mod tests {
     #[test]
     fn defaults_are_those_of_the_stages() {
         let p = plan("").unwrap();
+        let first = |name: &str| Some(name.to_string());
         let expected = RenderSettings {
             width: 0,
             height: 0,
+            integrator: first(crate::integrators::INTEGRATORS[0].name),
+            accelerator: first(crate::accel::ACCELERATORS[0].name),
+            emission: first(crate::photons::EMISSIONS[0].name),
             ..RenderSettings::default()
         };
         assert_eq!(p.settings, expected);

@@ -24,7 +24,17 @@ pub(super) struct Summary<'a> {
 /// A table of stages, counts and effects.
 pub(super) fn table(s: &Summary) -> String {
     let statistics = &s.rendering.statistics;
-    let mut rows: Vec<(&str, String)> = Vec::new();
+    let r = s.settings;
+    let mut rows: Vec<(&str, String)> = vec![(
+        "rendered",
+        format!(
+            "{}x{} pixels, {} samples each, integrator {}",
+            r.width,
+            r.height,
+            s.metadata.spp,
+            r.integrator.as_deref().unwrap_or_default()
+        ),
+    )];
     rows.extend(
         statistics
             .stages
@@ -44,13 +54,15 @@ pub(super) fn table(s: &Summary) -> String {
             (rays.photon, "photon"),
         ]),
     ));
-    for (map, p) in [
-        ("global map", &statistics.global_photons),
-        ("caustic map", &statistics.caustic_photons),
-    ] {
-        if p.emitted > 0 {
-            rows.push((map, photons(p)));
-        }
+    let (global, caustic) = (&statistics.global_photons, &statistics.caustic_photons);
+    if global.emitted > 0 {
+        // Of the caustic photons only those on specular paths are followed, so their flux says
+        // little.
+        let value = format!("{}; {}", photons(global), fate(global));
+        rows.push(("global map", value));
+    }
+    if caustic.emitted > 0 {
+        rows.push(("caustic map", photons(caustic)));
     }
     let peak = statistics.peak_memory_bytes.map_or("unknown".into(), bytes);
     rows.push((
@@ -96,13 +108,15 @@ fn parts(all: &[(u64, &str)]) -> String {
 }
 
 fn photons(p: &PhotonCounts) -> String {
-    let share = |flux: f64| {
-        let of = p.flux_emitted;
-        if of > 0.0 { 100.0 * flux / of } else { 0.0 }
-    };
+    parts(&[(p.emitted, "emitted"), (p.stored, "stored")])
+}
+
+/// Where the flux went.
+fn fate(p: &PhotonCounts) -> String {
+    let of = p.flux_emitted;
+    let share = |flux: f64| if of > 0.0 { 100.0 * flux / of } else { 0.0 };
     format!(
-        "{}; flux {:.1}% absorbed, {:.1}% escaped, {:.1}% cut",
-        parts(&[(p.emitted, "emitted"), (p.stored, "stored")]),
+        "flux {:.1}% absorbed, {:.1}% escaped, {:.1}% cut",
         share(p.flux_absorbed),
         share(p.flux_escaped),
         share(p.flux_cut)

@@ -6,9 +6,10 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, BufReader, Seek};
 use std::path::Path;
 
+use exr::meta::MetaData;
 use exr::meta::attribute::Chromaticities;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatImage, FlatSamples,
@@ -20,8 +21,9 @@ use super::{Metadata, OutputEntry, OutputSettings, Sink};
 use crate::error::{Error, Result};
 use crate::film::{Channel, Image, Layer};
 
-/// Largest image that is read, in pixels: a broken header must not exhaust the memory.
-const MAX_PIXELS: u64 = 1 << 28;
+/// Most values of an image that is read, over all channels: a damaged display window must not
+/// exhaust the memory.
+const MAX_VALUES: u64 = 1 << 30;
 
 /// Below this, half precision is coarser than its eleven bits already at a thousandth of the
 /// layer's largest value.
@@ -137,17 +139,25 @@ pub fn read(path: &Path) -> Result<Image> {
             "check the name",
         )
     })?;
+    let mut file = BufReader::new(file);
+    check_claims(&mut file).map_err(&broken)?;
     let file: FlatImage = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .all_layers()
         .all_attributes()
-        .from_buffered(BufReader::new(file))
+        .from_buffered(file)
         .map_err(|e| broken(format!("is no readable OpenEXR image ({e})")))?;
     let window = file.attributes.display_window;
     let (width, height) = (window.size.0, window.size.1);
-    if width == 0 || height == 0 || width as u64 * height as u64 > MAX_PIXELS {
+    let channels = (file.layer_data.iter())
+        .map(|part| part.channel_data.list.len() as u64)
+        .sum::<u64>();
+    let values = (width as u64)
+        .saturating_mul(height as u64)
+        .saturating_mul(channels);
+    if width == 0 || height == 0 || values > MAX_VALUES {
         return Err(broken(format!("has an odd size of {width}x{height}")));
     }
 
@@ -196,6 +206,28 @@ pub fn read(path: &Path) -> Result<Image> {
         height: height as u32,
         layers: layers.into_values().collect(),
     })
+}
+
+/// Whether the file can hold what its headers claim. The reader makes room for all of it before
+/// it sees the first pixel, so a damaged header could exhaust the memory.
+fn check_claims(file: &mut BufReader<File>) -> std::result::Result<(), String> {
+    let unreadable = |e: &dyn std::fmt::Display| format!("is no readable OpenEXR image ({e})");
+    let length = file.get_ref().metadata().map_err(|e| unreadable(&e))?.len();
+    let meta = MetaData::read_from_buffered(&mut *file, false).map_err(|e| unreadable(&e))?;
+    file.rewind().map_err(|e| unreadable(&e))?;
+    let claimed = meta.headers.iter().fold(0_u64, |sum, h| {
+        let pixels = (h.layer_size.0 as u64).saturating_mul(h.layer_size.1 as u64);
+        // At least as large in memory as a float.
+        let bytes = 4 * h.channels.list.len() as u64;
+        sum.saturating_add(pixels.saturating_mul(bytes))
+    });
+    // No compression of the format does better on an image of one colour.
+    if claimed > (64 << 20) + length.saturating_mul(4096) {
+        return Err(format!(
+            "is damaged: it cannot hold {claimed} bytes of pixels"
+        ));
+    }
+    Ok(())
 }
 
 /// The values of a data window within the display window.

@@ -8,7 +8,7 @@ mod png;
 
 pub use atomic::{check_writable, discard_unfinished, write_atomically};
 pub use exr::read;
-pub(crate) use png::display_bytes;
+pub use png::display_bytes;
 
 use std::io::{self, Seek, Write};
 use std::path::Path;

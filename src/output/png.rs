@@ -13,7 +13,7 @@ use crate::color::linear_to_srgb;
 use crate::film::Image;
 
 /// The sRGB bytes of the main layer, three per pixel, at the given exposure in stops.
-pub(crate) fn display_bytes(pixels: &[[f32; 3]], exposure: f64) -> Vec<u8> {
+pub fn display_bytes(pixels: &[[f32; 3]], exposure: f64) -> Vec<u8> {
     let scale = exposure.exp2();
     // A float-to-integer cast saturates and takes NaN to 0.
     let byte = |v: f32| (255.0 * linear_to_srgb(f64::from(v) * scale) + 0.5) as u8;
