@@ -137,7 +137,7 @@ fn render_in_pool(
     } else {
         PhotonMaps::default()
     };
-    clock.lap("photons");
+    clock.split("photons", maps.tracing, "photon maps");
 
     let context = RenderContext {
         scene,
@@ -241,6 +241,21 @@ impl Default for Clock {
 }
 
 impl Clock {
+    /// As [`lap`](Self::lap), for two stages of which the first took `seconds`.
+    fn split(&mut self, first: &'static str, seconds: f64, second: &'static str) {
+        self.lap(second);
+        if let Some(last) = self.laps.last_mut() {
+            last.seconds = (last.seconds - seconds).max(0.0);
+        }
+        self.laps.insert(
+            self.laps.len() - 1,
+            StageTime {
+                stage: first,
+                seconds,
+            },
+        );
+    }
+
     fn lap(&mut self, stage: &'static str) {
         let now = Instant::now();
         self.laps.push(StageTime {

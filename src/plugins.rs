@@ -5,6 +5,7 @@ use crate::accel::{ACCELERATORS, AcceleratorEntry};
 use crate::cameras::{CAMERAS, CameraEntry};
 use crate::effects::{EFFECTS, EffectEntry};
 use crate::integrators::{INTEGRATORS, IntegratorEntry};
+use crate::output::{OUTPUTS, OutputEntry};
 use crate::photons::{EMISSIONS, EmissionEntry};
 use crate::registry::{Entry, Table};
 use crate::scene::ScenePlugins;
@@ -24,6 +25,8 @@ pub struct Registry {
     pub scene: ScenePlugins,
     /// Cameras.
     pub cameras: Table<CameraEntry>,
+    /// Output formats.
+    pub outputs: Table<OutputEntry>,
 }
 
 impl Registry {
@@ -36,6 +39,7 @@ impl Registry {
             effects: Table::new(EFFECTS),
             scene: ScenePlugins::default(),
             cameras: Table::new(CAMERAS),
+            outputs: Table::new(OUTPUTS),
         }
     }
 
@@ -57,6 +61,7 @@ impl Registry {
             list(&self.scene.materials),
             list(&self.scene.lights),
             list(&self.cameras),
+            list(&self.outputs),
         ]
     }
 }

@@ -2,6 +2,7 @@
 
 mod rgb;
 mod transfer;
+pub mod units;
 
 pub use rgb::Rgb;
 pub use transfer::{linear_to_srgb, srgb_to_linear};

@@ -3,7 +3,7 @@
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub};
 
-use crate::math::DVec3;
+use crate::math::{DVec3, larger};
 
 /// Linear Rec.709 triple in `f64`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -49,7 +49,7 @@ impl Rgb {
     /// Largest channel.
     #[inline]
     pub fn max_channel(self) -> f64 {
-        self.r.max(self.g).max(self.b)
+        larger(larger(self.r, self.g), self.b)
     }
 
     /// Mean of the channels.

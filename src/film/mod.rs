@@ -165,6 +165,11 @@ impl Film {
         (lo, self.counts.iter().copied().max().unwrap_or(0))
     }
 
+    /// Samples taken in each pixel, row by row.
+    pub fn samples(&self) -> &[u32] {
+        &self.counts
+    }
+
     /// The developed image: means per pixel, as layers.
     pub fn develop(&self) -> Image {
         let channel = |name: &str, half: bool, f: &dyn Fn(&[f32; VALUES]) -> f32| Channel {

@@ -3,7 +3,7 @@
 use super::object::Placement;
 use super::{Hit, Object, Ray, Shape, sphere, triangle};
 use crate::ad::V3;
-use crate::math::{DVec3, robust};
+use crate::math::{DVec3, larger, robust};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -163,16 +163,17 @@ fn refine_local(
             let v = mesh.corners(prim);
             // A backend may report a hit an ulp outside, or on a triangle seen edge-on:
             // the point is kept on the triangle.
-            let (t, b1, b2) = match triangle::plane_hit(V3::<f64>::constant(o), V3::constant(d), v)
-            {
+            let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
+            let normal = e1.cross(e2);
+            let (o, d) = (V3::<f64>::constant(o), V3::constant(d));
+            let (t, b1, b2) = match triangle::plane_hit(o, d, v[0], e1, e2, normal) {
                 Some(h) => {
                     let (b1, b2) = clamp_barycentrics(h.b1, h.b2);
                     (h.t, b1, b2)
                 }
                 None => (t, 1.0 / 3.0, 1.0 / 3.0),
             };
-            let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
-            let ng = e1.cross(e2).normalize();
+            let ng = normal * (1.0 / normal.length_squared().sqrt());
             let n = mesh
                 .normal(prim, b1, b2)
                 .and_then(DVec3::try_normalize)
@@ -227,7 +228,7 @@ fn local_scale(place: Option<&Placement>) -> (DVec3, f64) {
 
 #[inline]
 fn clamp_barycentrics(b1: f64, b2: f64) -> (f64, f64) {
-    let (b1, b2) = (b1.max(0.0), b2.max(0.0));
+    let (b1, b2) = (larger(b1, 0.0), larger(b2, 0.0));
     let sum = b1 + b2;
     if sum > 1.0 {
         (b1 / sum, b2 / sum)

@@ -14,26 +14,33 @@ pub struct PlaneHit<R> {
     pub b2: R,
 }
 
-/// Intersects the line `o + t·d` with the plane of the triangle `v`, whether or not the point
-/// lies inside it; `None` if the line is parallel to the plane or the triangle has no area.
+/// Intersects the line `o + t·d` with the plane of the triangle `v0, v0 + e1, v0 + e2`, whether
+/// or not the point lies inside it; `n = e1 × e2`. `None` if the line is parallel to the plane or
+/// the triangle has no area.
 ///
-/// Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, JGT 2(1), 1997.
+/// Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, JGT 2(1), 1997, with
+/// the triple products arranged around the normal, which the caller needs anyway.
 #[inline]
-pub fn plane_hit<R: Real>(o: V3<R>, d: V3<R>, v: [DVec3; 3]) -> Option<PlaneHit<R>> {
-    let e1 = V3::constant(v[1] - v[0]);
-    let e2 = V3::constant(v[2] - v[0]);
-    let p = d.cross(e2);
-    let det = e1.dot(p);
+pub fn plane_hit<R: Real>(
+    o: V3<R>,
+    d: V3<R>,
+    v0: DVec3,
+    e1: DVec3,
+    e2: DVec3,
+    n: DVec3,
+) -> Option<PlaneHit<R>> {
+    let n = V3::constant(n);
+    let det = -d.dot(n);
     if det.re() == 0.0 || !det.re().is_finite() {
         return None;
     }
     let inv = R::constant(1.0) / det;
-    let s = o - V3::constant(v[0]);
-    let q = s.cross(e1);
+    let s = o - V3::constant(v0);
+    let m = s.cross(d) * inv;
     Some(PlaneHit {
-        t: e2.dot(q) * inv,
-        b1: s.dot(p) * inv,
-        b2: d.dot(q) * inv,
+        t: s.dot(n) * inv,
+        b1: V3::constant(e2).dot(m),
+        b2: -V3::constant(e1).dot(m),
     })
 }
 
@@ -137,21 +144,39 @@ mod tests {
     #[test]
     fn both_forms_agree_on_a_known_point() {
         let (o, d) = (DVec3::new(0.25, 0.5, 3.0), DVec3::new(0.0, 0.0, -2.0));
-        let a = plane_hit(V3::<f64>::constant(o), V3::constant(d), TRI).expect("not parallel");
+        let n = DVec3::Z;
+        let a = plane_hit(
+            V3::<f64>::constant(o),
+            V3::constant(d),
+            TRI[0],
+            TRI[1],
+            TRI[2],
+            n,
+        )
+        .expect("not parallel");
         let b = Watertight::new(o, d)
             .intersect(TRI, 0.0, 10.0)
             .expect("inside");
         for (t, b1, b2) in [(a.t, a.b1, a.b2), (b.t, b.b1, b.b2)] {
             assert_eq!((t, b1, b2), (1.5, 0.25, 0.5));
         }
-        let c = plane_hit(V3::<f32>::constant(o), V3::constant(d), TRI).expect("not parallel");
+        let c = plane_hit(
+            V3::<f32>::constant(o),
+            V3::constant(d),
+            TRI[0],
+            TRI[1],
+            TRI[2],
+            n,
+        )
+        .expect("not parallel");
         assert!((c.t - 1.5).abs() < 1e-6);
     }
 
     #[test]
     fn parallel_rays_and_degenerate_triangles_are_missed_without_nan() {
         let o = DVec3::new(-1.0, 0.25, 0.0);
-        assert!(plane_hit(V3::<f64>::constant(o), V3::constant(DVec3::X), TRI).is_none());
+        let (o64, d64) = (V3::<f64>::constant(o), V3::constant(DVec3::X));
+        assert!(plane_hit(o64, d64, TRI[0], TRI[1], TRI[2], DVec3::Z).is_none());
         assert!(
             Watertight::new(o, DVec3::X)
                 .intersect(TRI, 0.0, 10.0)

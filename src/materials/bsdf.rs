@@ -199,11 +199,18 @@ impl Bsdf {
 
     /// `f·|cos θi|` toward the unit direction `wi`, each lobe multiplied by
     /// `weight(pdf of that lobe)`; the pdf includes the probability of picking the lobe.
-    #[inline]
+    #[inline(always)]
     pub fn eval(&self, wi: DVec3, weight: impl Fn(f64) -> f64) -> BsdfValue {
         let mut out = BsdfValue::default();
         let local = self.frame.to_local(wi);
         if !self.sides_agree(wi, local) {
+            return out;
+        }
+        // By far the commonest surface needs neither loop nor dispatch.
+        if let [(Lobe::Lambert(lobe), _)] = self.lobes.as_slice() {
+            let (f, pdf) = lobe.eval(self.wo, local);
+            let factor = self.transport_factor(wi, local, 1.0);
+            out.diffuse = f * (local.z * factor * weight(pdf));
             return out;
         }
         for (lobe, pick) in &self.lobes {

@@ -15,7 +15,14 @@ pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec3};
 /// Largest absolute component of `v`.
 #[inline]
 pub fn max_abs(v: DVec3) -> f64 {
-    v.x.abs().max(v.y.abs()).max(v.z.abs())
+    larger(larger(v.x.abs(), v.y.abs()), v.z.abs())
+}
+
+/// The larger of two numbers, in one instruction; `b` if either is NaN. (`f64::max` takes care
+/// of NaN, at several times the price.)
+#[inline]
+pub fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Rounds every component to the nearest `f32` and promotes it back.

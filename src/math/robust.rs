@@ -1,6 +1,6 @@
 //! Rounding bounds for spawned rays.
 
-use super::{DVec3, max_abs};
+use super::{DVec3, larger, max_abs};
 
 /// Half a unit in the last place of `1f32`: the unit roundoff of single precision.
 pub const UNIT_ROUNDOFF: f64 = 5.960_464_477_539_063e-8;
@@ -14,5 +14,5 @@ pub const UNIT_ROUNDOFF: f64 = 5.960_464_477_539_063e-8;
 /// arrangements, from radii of 1e-4 to coordinates of 1e5.
 #[inline]
 pub fn spawn_offset(p: DVec3, c: DVec3, r: f64) -> f64 {
-    16.0 * UNIT_ROUNDOFF * (max_abs(p).max(max_abs(c)) + r)
+    16.0 * UNIT_ROUNDOFF * (larger(max_abs(p), max_abs(c)) + r)
 }

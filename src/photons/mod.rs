@@ -26,6 +26,8 @@ pub use map::{IrradianceMap, PhotonMap};
 pub use photon::{Photon, PhotonClass};
 pub use targets::Targets;
 
+use std::time::Instant;
+
 use crate::accel::Accelerator;
 use crate::control::Control;
 use crate::effects::EffectSet;
@@ -67,6 +69,10 @@ pub struct PhotonMaps {
     pub caustic_counts: PhotonCounts,
     /// Rays traced.
     pub rays: RayCounts,
+    /// Seconds spent emitting and following photons.
+    pub tracing: f64,
+    /// Seconds spent building maps and estimating irradiance.
+    pub building: f64,
 }
 
 /// Emits, follows and stores photons, and builds the maps that `effects` call for.
@@ -88,12 +94,19 @@ pub fn trace_photons(
         purpose,
         count,
     };
+    let run = |purpose, count, maps: &mut PhotonMaps| {
+        let start = Instant::now();
+        let source = (emission.build)(&context(purpose, count));
+        let pass = trace::run(scene, accel, &*source, purpose, settings, control);
+        maps.rays.add(&pass.rays);
+        maps.tracing += start.elapsed().as_secs_f64();
+        pass
+    };
+    let start = Instant::now();
     let indirect = effects.contains(EffectSet::INDIRECT) && settings.global > 0;
     if effects.contains(EffectSet::CAUSTICS) && settings.caustic > 0 {
-        let source = (emission.build)(&context(Purpose::Caustic, settings.caustic));
-        let pass = trace::run(scene, accel, &*source, Purpose::Caustic, settings, control);
+        let pass = run(Purpose::Caustic, settings.caustic, &mut maps);
         maps.caustic_counts = pass.counts;
-        maps.rays.add(&pass.rays);
         maps.caustic = Some(PhotonMap::build(pass.photons, settings.nearest, area));
         if gather && indirect {
             let glow = PhotonMap::build(pass.glow, settings.nearest, area);
@@ -101,10 +114,8 @@ pub fn trace_photons(
         }
     }
     if indirect {
-        let source = (emission.build)(&context(Purpose::Global, settings.global));
-        let pass = trace::run(scene, accel, &*source, Purpose::Global, settings, control);
+        let pass = run(Purpose::Global, settings.global, &mut maps);
         maps.global_counts = pass.counts;
-        maps.rays.add(&pass.rays);
         let map = PhotonMap::build(pass.photons, settings.nearest, area);
         if gather {
             let all = maps.glow.is_none();
@@ -113,5 +124,6 @@ pub fn trace_photons(
         }
         maps.global = Some(map);
     }
+    maps.building = start.elapsed().as_secs_f64() - maps.tracing;
     maps
 }

@@ -1,7 +1,7 @@
 //! Points for one pixel sample or one photon.
 //!
-//! The first few dimension pairs are an Owen-scrambled two-dimensional Sobol' sequence, shuffled
-//! between pairs, so that the leading decisions (lens, light, first bounce) are stratified over
+//! The first few dimension pairs are a two-dimensional Sobol' sequence, shuffled and shifted
+//! differently for every pair, so that the leading decisions (lens, light, first bounce) are stratified over
 //! the samples of a pixel or the photons of a light; later ones are pseudo-random.
 //!
 //! Sources: Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020 (shuffling and
@@ -29,7 +29,8 @@ const SOBOL_PAIRS: u32 = 8;
 #[derive(Clone, Debug)]
 pub struct Sampler {
     key: u64,
-    index: u32,
+    /// The index with its bits reversed: the first Sobol' dimension, as a 32-bit fraction.
+    reversed: u32,
     pair: u32,
     rng: Rng,
 }
@@ -42,7 +43,7 @@ impl Sampler {
         let sequence = hash2(hash2(seed, stream), hash2(key, index >> 32));
         Self {
             key: sequence,
-            index: index as u32,
+            reversed: (index as u32).reverse_bits(),
             pair: 0,
             rng: Rng::new(hash2(sequence, index.wrapping_add(0x5851_f42d_4c95_7f2d))),
         }
@@ -54,7 +55,7 @@ impl Sampler {
         if self.pair < SOBOL_PAIRS {
             self.pair += 1;
             let h = mix(self.key ^ u64::from(self.pair).wrapping_mul(GOLDEN));
-            sobol_2d(self.index, h)
+            sobol_2d(self.reversed, h)
         } else {
             self.rng.next_2d()
         }
@@ -84,21 +85,21 @@ fn laine_karras(mut x: u32, seed: u32) -> u32 {
     x
 }
 
+/// Both dimensions of the point, from its bit-reversed index: shuffled by an Owen scramble of
+/// the index, then shifted digitally. All of it works on reversed bits, so nothing is reversed.
 #[inline]
-fn sobol_2d(index: u32, h: u64) -> [f64; 2] {
-    let shuffled = laine_karras(index.reverse_bits(), h as u32).reverse_bits();
-    // In bit-reversed order the first dimension is the index itself.
-    let mut y = shuffled;
-    y ^= (y & 0xaaaa_aaaa) >> 1;
-    y ^= (y & 0xcccc_cccc) >> 2;
-    y ^= (y & 0xf0f0_f0f0) >> 4;
-    y ^= (y & 0xff00_ff00) >> 8;
-    y ^= (y & 0xffff_0000) >> 16;
-    let sx = (h >> 32) as u32;
-    let sy = sx.wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
+fn sobol_2d(reversed: u32, h: u64) -> [f64; 2] {
+    let x = laine_karras(reversed, h as u32);
+    let mut y = x;
+    y ^= (y & 0x5555_5555) << 1;
+    y ^= (y & 0x3333_3333) << 2;
+    y ^= (y & 0x0f0f_0f0f) << 4;
+    y ^= (y & 0x00ff_00ff) << 8;
+    y ^= y << 16;
+    let shift = (h >> 32) as u32;
     [
-        unit_u32(laine_karras(shuffled, sx).reverse_bits()),
-        unit_u32(laine_karras(y, sy).reverse_bits()),
+        unit_u32(x ^ shift),
+        unit_u32(y ^ shift.wrapping_mul(0x9e37_79b9).rotate_left(16)),
     ]
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
-use crate::math::DVec3;
+use crate::math::{DVec3, larger};
 
 /// Sine and cosine for `|x| ≤ π/4`, absolute error below 1e-13 (Taylor series to x¹⁵), summed in
 /// pairs so that the multiplications overlap.
@@ -48,13 +48,13 @@ pub fn disc(u: [f64; 2]) -> [f64; 2] {
 #[inline]
 pub fn cosine_hemisphere(u: [f64; 2]) -> DVec3 {
     let [x, y] = disc(u);
-    DVec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
+    DVec3::new(x, y, larger(1.0 - x * x - y * y, 0.0).sqrt())
 }
 
 /// Density `cos θ / π` in solid angle.
 #[inline]
 pub fn cosine_hemisphere_pdf(cos_theta: f64) -> f64 {
-    cos_theta.max(0.0) * FRAC_1_PI
+    larger(cos_theta, 0.0) * FRAC_1_PI
 }
 
 /// Uniform direction of the unit sphere; density `1/4π`.

@@ -1,0 +1,345 @@
+//! What was typed. Parsing touches no file.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::error::ErrorKind;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use super::values::{self, Crop, Size};
+use crate::report::ErrorMap;
+
+/// A photon-mapping renderer for glTF scenes.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "dualight", version = VERSION, max_term_width = 100)]
+#[command(after_help = "\
+Examples:
+  dualight render scene.glb -o scene.exr -o scene.png
+  dualight render scene.glb -o out.png --size 1920x1080 --spp 64 --photons 5M --time-limit 10m
+  dualight diff out.exr reference.exr -o error.png
+
+Exit status: 0 done, 1 rendering or reading or writing failed, 2 usage, 3 the file requires \
+something unsupported, 4 stopped at the time limit with a valid image, 130 interrupted.")]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (",
+    env!("DUALIGHT_GIT_COMMIT"),
+    ")"
+);
+
+/// What to do.
+#[derive(Clone, Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene to image files
+    Render(Box<RenderArgs>),
+    /// Tell what a scene holds and which effects it calls for
+    Inspect(InspectArgs),
+    /// List everything that can be chosen by name
+    Plugins,
+    /// Tell how far an image is from a reference
+    Diff(DiffArgs),
+}
+
+/// What the numbers of a file's lights mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Units {
+    /// As Blender's exporter writes them: watts times 683 for lamps
+    Blender,
+    /// Candela and lux, as glTF says; divided by 683 lm/W
+    Photometric,
+    /// W/sr and W/m², taken as they are
+    Radiometric,
+}
+
+/// Which scene, and how it is read.
+#[derive(Clone, Debug, Args)]
+pub struct SceneArgs {
+    /// glTF scene (.glb or .gltf)
+    #[arg(value_name = "SCENE")]
+    pub file: PathBuf,
+    /// What the numbers of the file's lights mean
+    #[arg(
+        long,
+        value_enum,
+        default_value = "blender",
+        hide_possible_values = false
+    )]
+    pub light_units: Units,
+    /// Scene within the file, if it holds several [default: the file's default]
+    #[arg(long = "scene", value_name = "NAME")]
+    pub name: Option<String>,
+}
+
+/// Options of `dualight render`.
+#[derive(Clone, Debug, Args)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as the help of the command")]
+    pub scene: SceneArgs,
+
+    /// Image to write; .exr holds every layer in linear light, .png the image as shown. May be
+    /// given several times. Written whole or not at all
+    #[arg(
+        short,
+        long = "output",
+        value_name = "FILE",
+        required_unless_present = "json"
+    )]
+    #[arg(help_heading = "Output")]
+    pub outputs: Vec<PathBuf>,
+    /// Exposure of .png images in stops: each doubles the brightness
+    #[arg(
+        long,
+        value_name = "STOPS",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
+    #[arg(value_parser = values::stops, help_heading = "Output")]
+    pub exposure: f64,
+    /// Write statistics as JSON to FILE, or to standard output without one
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    #[arg(help_heading = "Output")]
+    pub json: Option<Option<PathBuf>>,
+    /// Print nothing but errors
+    #[arg(short, long, help_heading = "Output")]
+    pub quiet: bool,
+
+    /// Size of the image in pixels [default: 512 wide, as high as the camera asks for]
+    #[arg(long, value_name = "WxH", help_heading = "Image")]
+    pub size: Option<Size>,
+    /// Camera samples per pixel
+    #[arg(long, value_name = "N", default_value = "16", value_parser = values::positive_u32)]
+    #[arg(help_heading = "Image")]
+    pub spp: u32,
+    /// Camera to look through [default: the first of the scene]
+    #[arg(long, value_name = "NAME", help_heading = "Image")]
+    pub camera: Option<String>,
+    /// Render only the pixels from X0,Y0 (upper left) to just before X1,Y1; the rest is black
+    #[arg(long, value_name = "X0,Y0,X1,Y1", help_heading = "Image")]
+    pub crop: Option<Crop>,
+    /// Seed of all random numbers; equal seeds give equal images
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Image")]
+    pub seed: u64,
+
+    /// How light is computed [default: photon; see dualight plugins]
+    #[arg(long, value_name = "NAME", help_heading = "Light transport")]
+    pub integrator: Option<String>,
+    /// What is simulated: auto (what the scene calls for), all, or changes to that such as
+    /// +caustics,-indirect
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(help_heading = "Light transport")]
+    pub effects: Option<String>,
+    /// Most scattering events between camera and light [default: no limit]
+    #[arg(long, value_name = "N", help_heading = "Light transport")]
+    pub max_depth: Option<u32>,
+    /// Never end long paths by chance
+    #[arg(long, help_heading = "Light transport")]
+    pub no_roulette: bool,
+    /// Shadow rays per camera sample at the first diffuse surface
+    #[arg(long, value_name = "N", value_parser = values::positive_u32)]
+    #[arg(help_heading = "Light transport")]
+    pub shadow_rays: Option<u32>,
+
+    /// Photons sent into the scene; 10k and 2M are understood
+    #[arg(long, value_name = "N", value_parser = values::photons, help_heading = "Photons")]
+    pub photons: Option<u64>,
+    /// Photons sent toward mirrors and glass
+    #[arg(long, value_name = "N", value_parser = values::photons, help_heading = "Photons")]
+    pub caustic_photons: Option<u64>,
+    /// Photons in a density estimate: more are smoother, fewer sharper
+    #[arg(long, value_name = "N", value_parser = values::positive_u32)]
+    #[arg(help_heading = "Photons")]
+    pub nearest: Option<u32>,
+    /// Final-gather rays per camera sample; off shows the photon map itself
+    #[arg(long, value_name = "N|off", value_parser = values::gather, help_heading = "Photons")]
+    pub gather: Option<u32>,
+    /// How photons leave the lights [see dualight plugins]
+    #[arg(long, value_name = "NAME", help_heading = "Photons")]
+    pub emission: Option<String>,
+
+    /// Ray tracing backend [see dualight plugins]
+    #[arg(long, value_name = "NAME", help_heading = "Machine")]
+    pub accel: Option<String>,
+    /// Threads [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = values::positive_u32, help_heading = "Machine")]
+    pub threads: Option<u32>,
+    /// Stop after 30s, 5m or 1h with the image as it is then (exit status 4)
+    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Machine")]
+    pub time_limit: Option<Duration>,
+}
+
+/// Options of `dualight inspect`.
+#[derive(Clone, Debug, Args)]
+pub struct InspectArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as the help of the command")]
+    pub scene: SceneArgs,
+}
+
+/// Options of `dualight diff`.
+#[derive(Clone, Debug, Args)]
+pub struct DiffArgs {
+    /// Image to judge (.exr)
+    #[arg(value_name = "A.exr")]
+    pub image: PathBuf,
+    /// Reference to judge it by (.exr), of the same size
+    #[arg(value_name = "B.exr")]
+    pub reference: PathBuf,
+    /// Picture of the error: false colours as .png, the numbers themselves as .exr
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// What the picture shows
+    #[arg(long, value_enum, default_value = "relative", requires = "output")]
+    pub error_map: ErrorMap,
+    /// Layer to compare, for instance caustics [default: the main image]
+    #[arg(long, value_name = "NAME")]
+    pub layer: Option<String>,
+    /// Exposure in stops at which FLIP looks at both
+    #[arg(
+        long,
+        value_name = "STOPS",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
+    #[arg(value_parser = values::stops)]
+    pub exposure: f64,
+    /// Print the numbers as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What to say when there is nothing to run: text that was asked for, or an error in one line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// Help or the version, for standard output.
+    Asked(String),
+    /// The help of a command that was typed without anything.
+    Help(String),
+    /// An error in one line.
+    Error(String),
+}
+
+/// Understands the words of a command line, the program's name first.
+///
+/// # Errors
+/// What to print instead of running.
+pub fn parse(
+    words: impl IntoIterator<Item = impl Into<std::ffi::OsString> + Clone>,
+) -> Result<Cli, Refusal> {
+    Cli::try_parse_from(words).map_err(|e| match e.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => Refusal::Asked(e.to_string()),
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => Refusal::Help(e.to_string()),
+        _ => Refusal::Error(condense(&e.to_string())),
+    })
+}
+
+/// The message of a parse error in one line: without the synopsis, hints joined by semicolons.
+fn condense(message: &str) -> String {
+    let mut out = String::new();
+    for line in message.lines().map(str::trim) {
+        if line.starts_with("Usage:") || line.starts_with("For more information") {
+            break;
+        }
+        let line = line.strip_prefix("error: ").unwrap_or(line);
+        if line.is_empty() {
+            continue;
+        }
+        if !out.is_empty() {
+            out.push_str(if out.ends_with(':') { " " } else { "; " });
+        }
+        out.push_str(line);
+    }
+    out.push_str("; see dualight --help");
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(line: &str) -> Result<Cli, Refusal> {
+        parse(line.split(' '))
+    }
+
+    fn error(line: &str) -> String {
+        match words(line) {
+            Err(Refusal::Error(e)) => e,
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_declaration_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_full_command_line_is_understood() {
+        let line = "dualight render s.glb -o a.exr -o a.png --spp 10k --size 3x2 --crop 0,0,1,1 \
+                    --exposure -1.5 --effects -caustics,+direct --gather off --json \
+                    --photons 2M --time-limit 1h30m --light-units photometric";
+        let Ok(Cli {
+            command: Command::Render(r),
+        }) = words(&line.split_whitespace().collect::<Vec<_>>().join(" "))
+        else {
+            panic!("not understood");
+        };
+        assert_eq!((r.outputs.len(), r.spp, r.exposure), (2, 10_000, -1.5));
+        assert_eq!(r.effects.as_deref(), Some("-caustics,+direct"));
+        assert_eq!((r.gather, r.photons), (Some(0), Some(2_000_000)));
+        assert_eq!(r.json, Some(None));
+        assert_eq!(r.scene.light_units, Units::Photometric);
+    }
+
+    #[test]
+    fn json_takes_a_file_only_with_an_equals_sign() {
+        // Otherwise `--json scene.glb` would overwrite the scene.
+        let Ok(Cli {
+            command: Command::Render(r),
+        }) = words("dualight render --json s.glb")
+        else {
+            panic!("not understood");
+        };
+        assert_eq!((r.json, r.scene.file), (Some(None), "s.glb".into()));
+    }
+
+    #[test]
+    fn errors_are_one_line_with_a_remedy() {
+        for (line, part) in [
+            ("dualight render s.glb -o a.png --spp 0", "at least 1"),
+            ("dualight render s.glb -o a.png --size 0x0", "640x480"),
+            ("dualight render s.glb -o a.png --sp 4", "'--spp'"),
+            ("dualight render s.glb", "--output <FILE>"),
+            ("dualight render -o a.png", "<SCENE>"),
+            ("dualight rendr", "'render'"),
+            ("dualight diff a.exr b.exr --error-map flip", "--output"),
+            (
+                "dualight render s.glb -o a.png --light-units lux",
+                "photometric",
+            ),
+        ] {
+            let e = error(line);
+            assert!(e.contains(part) && !e.contains('\n'), "{line}: {e}");
+        }
+    }
+
+    #[test]
+    fn help_is_no_error() {
+        assert!(matches!(
+            words("dualight render --help"),
+            Err(Refusal::Asked(_))
+        ));
+        assert!(matches!(
+            words("dualight --version"),
+            Err(Refusal::Asked(_))
+        ));
+        assert!(matches!(words("dualight"), Err(Refusal::Help(_))));
+    }
+}

@@ -1,0 +1,260 @@
+//! What a command line means: settings for each stage, checked against the plugins there are.
+//! Touches no file.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::args::{RenderArgs, SceneArgs, Units};
+use super::values::Size;
+use crate::error::{Error, Result};
+use crate::import::{ImportOptions, LightUnits};
+use crate::integrators::IntegratorSettings;
+use crate::output::{self, OutputSettings};
+use crate::pipeline::RenderSettings;
+use crate::plugins::Registry;
+use crate::scene::Scene;
+
+/// Width of an image whose size is not given.
+const DEFAULT_WIDTH: u32 = 512;
+
+/// Largest height that a camera's aspect leads to; who wants more gives a size.
+const MAX_DEFAULT_HEIGHT: f64 = 8192.0;
+
+/// Where statistics go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StatisticsTarget {
+    /// Standard output.
+    Stdout,
+    /// A file.
+    File(PathBuf),
+}
+
+/// What `dualight render` is to do.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The scene's file.
+    pub scene: PathBuf,
+    /// How it is read.
+    pub import: ImportOptions,
+    /// The images to write.
+    pub outputs: Vec<PathBuf>,
+    /// How they are written.
+    pub output_settings: OutputSettings,
+    /// Where the statistics go, if anywhere.
+    pub statistics: Option<StatisticsTarget>,
+    /// When to stop, from the start of the command.
+    pub time_limit: Option<Duration>,
+    /// Whether to print nothing but errors.
+    pub quiet: bool,
+    size: Option<Size>,
+    /// Width and height are not settled before the camera is known.
+    settings: RenderSettings,
+}
+
+impl Plan {
+    /// Makes sense of what was typed.
+    ///
+    /// # Errors
+    /// Names that no plugin has, extensions that no format has, options that contradict one
+    /// another.
+    pub fn new(args: &RenderArgs, registry: &Registry) -> Result<Self> {
+        if let Some(name) = &args.integrator {
+            registry.integrators.find(name)?;
+        }
+        if let Some(name) = &args.accel {
+            registry.accelerators.find(name)?;
+        }
+        if let Some(name) = &args.emission {
+            registry.emissions.find(name)?;
+        }
+        let effects = args.effects.clone().unwrap_or_else(|| "auto".into());
+        check_effects(&effects, registry)?;
+        for path in &args.outputs {
+            output::format_of(&registry.outputs, path)?;
+        }
+        let defaults = IntegratorSettings::default();
+        let plan = Self {
+            scene: args.scene.file.clone(),
+            import: import_options(&args.scene),
+            outputs: args.outputs.clone(),
+            output_settings: OutputSettings {
+                exposure: args.exposure,
+            },
+            statistics: args.json.as_ref().map(|file| match file {
+                None => StatisticsTarget::Stdout,
+                Some(path) => StatisticsTarget::File(path.clone()),
+            }),
+            time_limit: args.time_limit,
+            quiet: args.quiet,
+            size: args.size,
+            settings: RenderSettings {
+                integrator: args.integrator.clone(),
+                accelerator: args.accel.clone(),
+                emission: args.emission.clone(),
+                effects,
+                width: 0,
+                height: 0,
+                spp: args.spp,
+                crop: args.crop.map(|c| c.0),
+                camera: args.camera.clone(),
+                threads: args.threads.map(|n| n as usize),
+                integrator_settings: IntegratorSettings {
+                    seed: args.seed,
+                    max_depth: args.max_depth,
+                    roulette: !args.no_roulette,
+                    photons: args.photons.unwrap_or(defaults.photons),
+                    caustic_photons: args.caustic_photons.unwrap_or(defaults.caustic_photons),
+                    nearest: args.nearest.map_or(defaults.nearest, |n| n as usize),
+                    gather_rays: args.gather.unwrap_or(defaults.gather_rays),
+                    shadow_rays: args.shadow_rays.unwrap_or(defaults.shadow_rays),
+                },
+            },
+        };
+        if let Some(size) = plan.size {
+            plan.check_crop(size)?;
+        }
+        Ok(plan)
+    }
+
+    /// The settings for a scene, whose camera may settle the image's size.
+    ///
+    /// # Errors
+    /// A crop outside the image.
+    pub fn settings_for(&self, scene: &Scene) -> Result<RenderSettings> {
+        let size = self.size.unwrap_or_else(|| {
+            let camera = match &self.settings.camera {
+                None => scene.cameras.first(),
+                Some(name) => scene.cameras.iter().find(|c| c.name == *name),
+            };
+            default_size(camera.and_then(|c| c.aspect))
+        });
+        self.check_crop(size)?;
+        Ok(RenderSettings {
+            width: size.width,
+            height: size.height,
+            ..self.settings.clone()
+        })
+    }
+
+    fn check_crop(&self, size: Size) -> Result<()> {
+        match self.settings.crop {
+            Some([x0, y0, x1, y1]) if x1 > size.width || y1 > size.height => {
+                Err(Error::Usage(format!(
+                    "--crop {x0},{y0},{x1},{y1} reaches beyond the image; stay within 0,0,{},{}",
+                    size.width, size.height
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// How a scene's file is to be read.
+pub fn import_options(args: &SceneArgs) -> ImportOptions {
+    ImportOptions {
+        light_units: match args.light_units {
+            Units::Blender => LightUnits::Blender,
+            Units::Photometric => LightUnits::Photometric,
+            Units::Radiometric => LightUnits::Radiometric,
+        },
+        scene: args.name.clone(),
+    }
+}
+
+/// Finds mistakes in `--effects` before a scene is loaded; what it means is the survey's.
+fn check_effects(wish: &str, registry: &Registry) -> Result<()> {
+    for word in wish.split(',').map(str::trim) {
+        if matches!(word, "auto" | "all") {
+            continue;
+        }
+        let name = word.strip_prefix(['+', '-']).ok_or_else(|| {
+            Error::Usage(format!(
+                "--effects '{word}' is neither auto, all, +NAME nor -NAME; see dualight plugins"
+            ))
+        })?;
+        registry.effects.find(name)?;
+    }
+    Ok(())
+}
+
+/// The size of an image for a camera of the given aspect, if it has one.
+fn default_size(aspect: Option<f64>) -> Size {
+    let aspect = aspect.filter(|a| a.is_finite() && *a > 0.0).unwrap_or(1.0);
+    let height = (f64::from(DEFAULT_WIDTH) / aspect).round();
+    Size {
+        width: DEFAULT_WIDTH,
+        height: height.clamp(1.0, MAX_DEFAULT_HEIGHT) as u32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::args::{self, Command};
+
+    fn plan(options: &str) -> Result<Plan> {
+        let line = format!("dualight render s.glb -o a.exr {options}");
+        match args::parse(line.split_whitespace()).unwrap().command {
+            Command::Render(r) => Plan::new(&r, &Registry::builtin()),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_stages() {
+        let p = plan("").unwrap();
+        let expected = RenderSettings {
+            width: 0,
+            height: 0,
+            ..RenderSettings::default()
+        };
+        assert_eq!(p.settings, expected);
+    }
+
+    #[test]
+    fn options_arrive_where_they_belong() {
+        let p = plan(
+            "--gather off --photons 2M --caustic-photons 10k --nearest 5 --shadow-rays 3 \
+             --no-roulette --max-depth 4 --seed 9 --threads 2 --effects all,-caustics",
+        )
+        .unwrap();
+        let i = &p.settings.integrator_settings;
+        assert_eq!(
+            (i.gather_rays, i.photons, i.caustic_photons),
+            (0, 2_000_000, 10_000)
+        );
+        assert_eq!((i.nearest, i.shadow_rays, i.roulette), (5, 3, false));
+        assert_eq!(
+            (i.max_depth, i.seed, p.settings.threads),
+            (Some(4), 9, Some(2))
+        );
+        assert_eq!(p.settings.effects, "all,-caustics");
+    }
+
+    #[test]
+    fn mistakes_are_usage_errors_that_name_the_remedy() {
+        for (options, part) in [
+            ("--integrator magic", "known: photon"),
+            ("--accel magic", "known: "),
+            ("--emission magic", "known: "),
+            ("--effects magic", "+NAME"),
+            ("--effects +magic", "known: direct"),
+            ("--effects=", "+NAME"),
+            ("-o b.jpg", ".exr, .png"),
+            ("--size 8x8 --crop 0,0,9,8", "stay within 0,0,8,8"),
+        ] {
+            let e = plan(options).unwrap_err();
+            assert_eq!(e.exit_code(), 2, "{options}");
+            assert!(e.to_string().contains(part), "{options}: {e}");
+        }
+    }
+
+    #[test]
+    fn the_camera_settles_the_height() {
+        let height = |a| default_size(a).height;
+        assert_eq!(height(None), 512);
+        assert_eq!(height(Some(16.0 / 9.0)), 288);
+        assert_eq!((height(Some(1e9)), height(Some(1e-9))), (1, 8192));
+        assert_eq!((height(Some(f64::NAN)), height(Some(-1.0))), (512, 512));
+    }
+}

@@ -1,0 +1,151 @@
+//! What a finished rendering tells of itself: a table for people, JSON for programs.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::format::{bytes, count};
+use crate::control::Stopped;
+use crate::output::Metadata;
+use crate::pipeline::{RenderSettings, Rendering};
+use crate::stats::PhotonCounts;
+
+/// Everything there is to tell.
+pub(super) struct Summary<'a> {
+    pub(super) scene: &'a Path,
+    pub(super) settings: &'a RenderSettings,
+    pub(super) outputs: &'a [PathBuf],
+    pub(super) metadata: &'a Metadata,
+    pub(super) rendering: &'a Rendering,
+    pub(super) seconds: f64,
+}
+
+/// A table of stages, counts and effects.
+pub(super) fn table(s: &Summary) -> String {
+    let statistics = &s.rendering.statistics;
+    let mut rows: Vec<(&str, String)> = Vec::new();
+    rows.extend(
+        statistics
+            .stages
+            .iter()
+            .map(|t| (t.stage, format!("{:9.3} s", t.seconds))),
+    );
+    rows.push(("total", format!("{:9.3} s", s.seconds)));
+
+    let rays = &statistics.rays;
+    rows.push((
+        "rays",
+        parts(&[
+            (rays.camera, "camera"),
+            (rays.shadow, "shadow"),
+            (rays.bounce, "bounce"),
+            (rays.gather, "gather"),
+            (rays.photon, "photon"),
+        ]),
+    ));
+    for (map, p) in [
+        ("global map", &statistics.global_photons),
+        ("caustic map", &statistics.caustic_photons),
+    ] {
+        if p.emitted > 0 {
+            rows.push((map, photons(p)));
+        }
+    }
+    let peak = statistics.peak_memory_bytes.map_or("unknown".into(), bytes);
+    rows.push((
+        "memory",
+        format!(
+            "{peak} at most, {} of it for {}",
+            bytes(statistics.accelerator_bytes),
+            statistics.accelerator
+        ),
+    ));
+    for d in &s.rendering.effects {
+        let state = if d.on { "on" } else { "skipped" };
+        rows.push(("effect", format!("{:<11}{state:<9}{}", d.name, d.reason)));
+    }
+    if statistics.rejected_pixels > 0 {
+        let n = statistics.rejected_pixels;
+        rows.push((
+            "BUG",
+            format!("{n} pixel sums were not finite and left out"),
+        ));
+    }
+    rows.extend(s.outputs.iter().map(|p| ("wrote", p.display().to_string())));
+
+    let mut out = String::new();
+    for (name, value) in rows {
+        // Writing to a string does not fail.
+        let _ = writeln!(out, "{name:>12}  {value}");
+    }
+    out
+}
+
+fn parts(all: &[(u64, &str)]) -> String {
+    let named: Vec<String> = all
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, name)| format!("{} {name}", count(*n as f64)))
+        .collect();
+    if named.is_empty() {
+        "none".into()
+    } else {
+        named.join(", ")
+    }
+}
+
+fn photons(p: &PhotonCounts) -> String {
+    let share = |flux: f64| {
+        let of = p.flux_emitted;
+        if of > 0.0 { 100.0 * flux / of } else { 0.0 }
+    };
+    format!(
+        "{}; flux {:.1}% absorbed, {:.1}% escaped, {:.1}% cut",
+        parts(&[(p.emitted, "emitted"), (p.stored, "stored")]),
+        share(p.flux_absorbed),
+        share(p.flux_escaped),
+        share(p.flux_cut)
+    )
+}
+
+/// The statistics as one JSON object, with a line break at the end.
+pub(super) fn json(s: &Summary) -> String {
+    let r = s.settings;
+    let i = &r.integrator_settings;
+    let value = json!({
+        "software": Metadata::SOFTWARE,
+        "commit": Metadata::COMMIT,
+        "command_line": s.metadata.command_line,
+        "scene": s.scene.to_string_lossy(),
+        "outputs": s.outputs.iter().map(|p| p.to_string_lossy()).collect::<Vec<_>>(),
+        "settings": {
+            "integrator": r.integrator,
+            "accelerator": r.accelerator,
+            "emission": r.emission,
+            "effects": r.effects,
+            "width": r.width,
+            "height": r.height,
+            "spp": r.spp,
+            "crop": r.crop,
+            "camera": r.camera,
+            "threads": r.threads,
+            "seed": i.seed,
+            "max_depth": i.max_depth,
+            "roulette": i.roulette,
+            "photons": i.photons,
+            "caustic_photons": i.caustic_photons,
+            "nearest": i.nearest,
+            "gather_rays": i.gather_rays,
+            "shadow_rays": i.shadow_rays,
+        },
+        "seconds": s.seconds,
+        "stopped": s.rendering.stopped.map(|why| match why {
+            Stopped::Interrupted => "interrupted",
+            Stopped::TimeLimit => "time_limit",
+        }),
+        "effects": s.rendering.effects,
+        "statistics": s.rendering.statistics,
+    });
+    format!("{value:#}\n")
+}

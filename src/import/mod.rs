@@ -1,0 +1,274 @@
+//! Import: a glTF 2.0 file becomes a scene.
+//!
+//! The JSON is read by a cursor that knows its place, accessors by code that checks every bound:
+//! a broken file gives one error that names the file, the place in it and the remedy. What is
+//! not supported is named in a warning; what a file *requires* and is not supported is an error.
+
+mod accessor;
+mod container;
+mod json;
+mod material;
+mod mesh;
+mod node;
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+pub use crate::color::units::LightUnits;
+use crate::error::{Error, Result};
+use crate::materials::MaterialDesc;
+use crate::scene::{Scene, SceneBuilder, ScenePlugins};
+use accessor::Source;
+use json::Cursor;
+use node::Walker;
+
+/// How a file is to be read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImportOptions {
+    /// In which units the intensities of punctual lights are given.
+    pub light_units: LightUnits,
+    /// Name of the scene; `None` for the file's default.
+    pub scene: Option<String>,
+}
+
+/// Extensions that are honoured; a file may require them.
+const SUPPORTED: &[&str] = &[
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+];
+
+/// Something is wrong at a place in the file.
+#[derive(Debug)]
+struct Problem {
+    place: String,
+    problem: String,
+    remedy: String,
+    kind: ProblemKind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ProblemKind {
+    Invalid,
+    Unsupported,
+    File,
+}
+
+impl Problem {
+    fn invalid(place: &str, problem: impl Into<String>) -> Self {
+        Self {
+            place: place.into(),
+            problem: problem.into(),
+            remedy: "export the file again, or run it through a glTF validator".into(),
+            kind: ProblemKind::Invalid,
+        }
+    }
+
+    fn unsupported(place: &str, problem: impl Into<String>, remedy: &str) -> Self {
+        Self {
+            remedy: remedy.into(),
+            kind: ProblemKind::Unsupported,
+            ..Self::invalid(place, problem)
+        }
+    }
+
+    fn file(path: &Path, e: &std::io::Error) -> Self {
+        let place = path.display().to_string();
+        Self {
+            remedy: "check the path and its permissions".into(),
+            kind: ProblemKind::File,
+            ..Self::invalid(&place, format!("cannot be read ({e})"))
+        }
+    }
+
+    fn into_error(self, path: &Path) -> Error {
+        let Self {
+            place,
+            problem,
+            remedy,
+            kind,
+        } = self;
+        let path = path.to_owned();
+        match kind {
+            ProblemKind::Invalid => Error::Scene {
+                path,
+                place,
+                problem,
+                remedy,
+            },
+            ProblemKind::Unsupported => Error::Unsupported {
+                path,
+                place,
+                problem,
+                remedy,
+            },
+            ProblemKind::File => Error::File {
+                path,
+                problem,
+                remedy,
+            },
+        }
+    }
+}
+
+/// What could not be honoured, with counts; each kind is told once.
+#[derive(Default)]
+struct Notes(BTreeMap<String, usize>);
+
+impl Notes {
+    fn add(&mut self, what: impl Into<String>, n: usize) {
+        *self.0.entry(what.into()).or_default() += n;
+    }
+}
+
+/// Reads the glTF file at `path`.
+///
+/// # Errors
+/// [`Error::File`] if it cannot be read, [`Error::Scene`] if it is broken or empty,
+/// [`Error::Unsupported`] if it requires what Dualight cannot do.
+pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Result<Scene> {
+    let mut builder = SceneBuilder::new(plugins);
+    let mut notes = Notes::default();
+    let document = container::open(path, |root| check_extensions(root, &mut notes))
+        .map_err(|p| p.into_error(path))?;
+    let root = Cursor::root(&document.json);
+    let source = Source {
+        root: root.clone(),
+        buffers: &document.buffers,
+    };
+    fill(&root, &source, options, &mut builder, &mut notes).map_err(|e| match e {
+        Failure::Problem(p) => p.into_error(path),
+        Failure::Plugin(place, e) => match e {
+            Error::Usage(problem) => Problem::invalid(&place, problem).into_error(path),
+            other => other,
+        },
+    })?;
+    for (what, n) in notes.0 {
+        builder.warn(if n > 1 {
+            format!("{what} ({n} times)")
+        } else {
+            what
+        });
+    }
+    if builder.placed() == 0 {
+        let p = Problem {
+            remedy: "export at least one mesh with the scene".into(),
+            ..Problem::invalid("the scene", "holds no geometry")
+        };
+        return Err(p.into_error(path));
+    }
+    let scene = builder.finish()?;
+    if scene.geometry.objects.is_empty() {
+        let p = Problem {
+            remedy: "export at least one mesh with surface".into(),
+            ..Problem::invalid("the scene", "holds no triangle or sphere that could be hit")
+        };
+        return Err(p.into_error(path));
+    }
+    Ok(scene)
+}
+
+/// Why filling a scene failed.
+enum Failure {
+    /// The file is at fault.
+    Problem(Problem),
+    /// A plugin refused what the file says at a place.
+    Plugin(String, Error),
+}
+
+impl From<Problem> for Failure {
+    fn from(p: Problem) -> Self {
+        Self::Problem(p)
+    }
+}
+
+fn fill<'a>(
+    root: &Cursor<'a>,
+    source: &Source<'a>,
+    options: &ImportOptions,
+    builder: &mut SceneBuilder,
+    notes: &mut Notes,
+) -> Result<(), Failure> {
+    if root.get("animations").is_some() {
+        notes.add("animations are not supported yet: the rest pose is used", 1);
+    }
+    let mut materials = Vec::new();
+    for m in root.items("materials")? {
+        let desc = material::read(&m, notes)?;
+        let id = builder
+            .add_material(&desc)
+            .map_err(|e| Failure::Plugin(m.path().to_owned(), e))?;
+        materials.push(id);
+    }
+    let default_material = builder
+        .add_material(&MaterialDesc::default())
+        .map_err(|e| Failure::Plugin("the default material".into(), e))?;
+    let roots = roots(root, options)?;
+    let mut walker = Walker {
+        source,
+        options,
+        materials: &materials,
+        default_material,
+        builder,
+        notes,
+        meshes: HashMap::new(),
+    };
+    walker.walk(&roots)?;
+    Ok(())
+}
+
+fn check_extensions(root: &Cursor<'_>, notes: &mut Notes) -> Result<(), Problem> {
+    for e in root.items("extensionsRequired")? {
+        let name = e.str()?;
+        if !SUPPORTED.contains(&name) {
+            return Err(Problem::unsupported(
+                e.path(),
+                format!("the file requires {name}, which is not supported"),
+                "export it without this extension",
+            ));
+        }
+    }
+    for e in root.items("extensionsUsed")? {
+        let name = e.str()?;
+        if !SUPPORTED.contains(&name) {
+            notes.add(format!("{name} is not supported and ignored"), 1);
+        }
+    }
+    Ok(())
+}
+
+/// The root nodes of the chosen scene, as references.
+fn roots<'a>(root: &Cursor<'a>, options: &ImportOptions) -> Result<Vec<Cursor<'a>>, Problem> {
+    let scenes = root.items("scenes")?;
+    let chosen = match &options.scene {
+        Some(name) => {
+            let named = |s: &&Cursor<'_>| s.get("name").is_some_and(|n| n.value() == name.as_str());
+            Some(scenes.iter().find(named).ok_or_else(|| {
+                let known: Vec<String> = scenes.iter().map(Cursor::name).collect();
+                Problem {
+                    remedy: format!("known scenes: {}", known.join(", ")),
+                    ..Problem::invalid("scenes", format!("none is named '{name}'"))
+                }
+            })?)
+        }
+        None => match root.get("scene") {
+            Some(at) => Some(
+                scenes
+                    .get(at.index()?)
+                    .ok_or_else(|| at.problem("names a scene that does not exist"))?,
+            ),
+            None => scenes.first(),
+        },
+    };
+    match chosen {
+        Some(scene) => scene.items("nodes"),
+        None => Err(Problem {
+            remedy: "export the file with a scene".into(),
+            ..Problem::invalid("scenes", "the file holds no scene")
+        }),
+    }
+}
