@@ -24,6 +24,7 @@
 //! - **Densities**: `pdf` is in solid angle unless its name says `pdf_area`.
 //! - **Random numbers** are a pure function of (seed, stream, key, index).
 #![deny(unsafe_code)]
+#![warn(clippy::unwrap_used)]
 #![cfg_attr(
     test,
     allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")

@@ -107,7 +107,7 @@ impl<'a> Cursor<'a> {
     /// This index or count.
     pub(super) fn index(&self) -> Result<usize, Problem> {
         // Some exporters write whole numbers as 5.0.
-        let whole = |x: f64| x >= 0.0 && x <= 9e15 && x.fract() == 0.0;
+        let whole = |x: f64| (0.0..=9e15).contains(&x) && x.fract() == 0.0;
         self.value
             .as_u64()
             .or_else(|| self.value.as_f64().filter(|x| whole(*x)).map(|x| x as u64))

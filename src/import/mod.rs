@@ -142,7 +142,7 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
     };
     fill(&root, &source, options, &mut builder, &mut notes).map_err(|e| match e {
         Failure::Problem(p) => p.into_error(path),
-        Failure::Plugin(place, e) => match e {
+        Failure::Plugin(place, e) => match *e {
             Error::Usage(problem) => Problem::invalid(&place, problem).into_error(path),
             other => other,
         },
@@ -177,7 +177,7 @@ enum Failure {
     /// The file is at fault.
     Problem(Problem),
     /// A plugin refused what the file says at a place.
-    Plugin(String, Error),
+    Plugin(String, Box<Error>),
 }
 
 impl From<Problem> for Failure {
@@ -201,12 +201,12 @@ fn fill<'a>(
         let desc = material::read(&m, notes)?;
         let id = builder
             .add_material(&desc)
-            .map_err(|e| Failure::Plugin(m.path().to_owned(), e))?;
+            .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
         materials.push(id);
     }
     let default_material = builder
         .add_material(&MaterialDesc::default())
-        .map_err(|e| Failure::Plugin("the default material".into(), e))?;
+        .map_err(|e| Failure::Plugin("the default material".into(), Box::new(e)))?;
     let roots = roots(root, options)?;
     let mut walker = Walker {
         source,

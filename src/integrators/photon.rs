@@ -156,7 +156,8 @@ impl PhotonMapping<'_> {
             if bsdf.has_diffuse() {
                 let first = !std::mem::replace(diffuse_seen, true);
                 let share = beta.max_channel().min(1.0);
-                let part = self.diffuse(&sp, &bsdf, share, sampler, first, out, scratch);
+                let densities = first.then_some(&mut out.photons);
+                let part = self.diffuse(&sp, &bsdf, share, sampler, densities, scratch);
                 for (component, radiance) in [
                     (Component::Direct, part.direct),
                     (Component::Caustics, part.caustics),
@@ -239,15 +240,15 @@ struct DiffuseLight {
 
 impl PhotonMapping<'_> {
     /// Everything that the diffuse lobes at a point send back. `share` is how much of it the
-    /// pixel sees: a faint branch gets fewer rays.
+    /// pixel sees: a faint branch gets fewer rays. `densities` takes the densities of global and
+    /// caustic photons, if they are wanted.
     fn diffuse(
         &self,
         sp: &SurfacePoint,
         full: &Bsdf,
         share: f64,
         sampler: &mut Sampler,
-        first: bool,
-        out: &mut PixelSample,
+        mut densities: Option<&mut [f64; 2]>,
         scratch: &mut Scratch,
     ) -> DiffuseLight {
         let cx = &self.cx;
@@ -291,16 +292,16 @@ impl PhotonMapping<'_> {
                 |wi| bsdf.diffuse_f(wi),
             );
             light.caustics += e.value;
-            if first {
-                out.photons[1] += e.density;
+            if let Some(d) = &mut densities {
+                d[1] += e.density;
             }
         }
 
         // The global map: seen by gather rays, or directly.
-        if first {
-            if let Some(s) = self.irradiance(&here, scratch) {
-                out.photons[0] += s.2;
-            }
+        if let Some(d) = &mut densities
+            && let Some(s) = self.irradiance(&here, scratch)
+        {
+            d[0] += s.2;
         }
         if gather_rays == 0 {
             if let Some(map) = &cx.maps.global {
@@ -311,8 +312,8 @@ impl PhotonMapping<'_> {
                     |wi| bsdf.diffuse_f(wi),
                 );
                 light.indirect += e.value;
-                if first {
-                    out.photons[0] += e.density;
+                if let Some(d) = &mut densities {
+                    d[0] += e.density;
                 }
             }
             return light;

@@ -128,7 +128,7 @@ impl PhotonMap {
             keep(photon.class) && site.accepts(photon.p, photon.ng(), r2)
         });
         let (full, r2) = found.kernel();
-        if found.len() == 0 {
+        if found.is_empty() {
             return Estimate {
                 radius: f64::from(self.max_radius),
                 ..Default::default()
