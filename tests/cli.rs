@@ -1,4 +1,5 @@
 //! The program as it is run: exit statuses, one-line messages, and that mistakes leave no file.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use std::ffi::OsStr;
 use std::fs;

@@ -8,6 +8,7 @@ mod png;
 
 pub use atomic::{check_writable, discard_unfinished, write_atomically};
 pub use exr::read;
+#[cfg(any(feature = "flip", test))]
 pub(crate) use png::display_bytes;
 
 use std::io::{self, Seek, Write};
