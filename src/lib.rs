@@ -6,7 +6,7 @@
 //!                         │
 //!                         ├──▶ Accelerator: embree | bvh            rays in, hits out
 //!                         ▼
-//!    Emission ──▶ photon tracing ──▶ PhotonMaps {global, caustic}
+//!    Emission ──▶ photon tracing ──▶ PhotonMaps {global, caustic, glow}
 //!                                                            │
 //!    Camera ──▶ integrator: photon | path ◀── radiance / irradiance estimates
 //!                         ▼
@@ -19,7 +19,8 @@
 //!   where the path came from, `wi` to where it goes. A stored photon keeps `wi`.
 //! - **Normals**: `ng` geometric, out of the front; `n` shading, in the hemisphere of `ng`.
 //! - **Spaces**: world space unless a name says otherwise (`world_from_object`); local frames
-//!   have the shading normal as `z`. The world's origin is the centre of the scene.
+//!   have the shading normal as `z`. A scene far from the
+//!   origin is moved to it ([`scene::Scene::center`]).
 //! - **Units**: metres, watts, W/sr, W/m², W/(m²·sr), per linear Rec.709 channel; radians.
 //! - **Densities**: `pdf` is in solid angle unless its name says `pdf_area`.
 //! - **Random numbers** are a pure function of (seed, stream, key, index).

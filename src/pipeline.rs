@@ -3,9 +3,9 @@
 use std::time::Instant;
 
 use crate::control::{Control, Stopped};
-use crate::effects::{self, Decision};
+use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
-use crate::film::Film;
+use crate::film::{Component, Film};
 use crate::integrators::{IntegratorSettings, Region, RenderContext, camera_pass};
 use crate::photons::{PhotonMaps, PhotonSettings, trace_photons};
 use crate::plugins::Registry;
@@ -106,7 +106,7 @@ fn render_in_pool(
         .choose(settings.accelerator.as_deref())?;
     let camera = choose_camera(scene, settings, registry)?;
     let region = region(settings)?;
-    let effects = effects::survey(scene, &settings.effects)?;
+    let effects = effects::survey(scene, &settings.effects, &registry.effects)?;
     clock.lap("survey");
 
     let accel = {
@@ -148,6 +148,7 @@ fn render_in_pool(
     };
     let integrator = (integrator.build)(context);
     let mut film = Film::new(settings.width, settings.height);
+    film.keep(&components(effects.set));
     let camera_rays = camera_pass(
         &*camera,
         &*integrator,
@@ -178,6 +179,20 @@ fn render_in_pool(
         stopped: control.stopped(),
         effects: effects.decisions,
     })
+}
+
+/// The components of the image that the effects leave.
+fn components(set: EffectSet) -> Vec<Component> {
+    let bits = |c| match c {
+        Component::Direct => EffectSet::DIRECT,
+        Component::Specular => EffectSet::SPECULAR | EffectSet::REFRACTION,
+        Component::Caustics => EffectSet::CAUSTICS,
+        Component::Indirect => EffectSet::INDIRECT,
+    };
+    Component::ALL
+        .into_iter()
+        .filter(|c| set.intersects(bits(*c)))
+        .collect()
 }
 
 fn choose_camera(

@@ -62,7 +62,8 @@ impl<E: Entry + Copy> Table<E> {
         }
     }
 
-    /// Adds a plugin of one's own, before the built-in ones.
+    /// Adds a plugin of one's own, after the built-in ones: it never becomes a default, and is
+    /// chosen by its name.
     ///
     /// # Errors
     /// [`Error::Usage`] if the name is taken.
@@ -74,7 +75,7 @@ impl<E: Entry + Copy> Table<E> {
                 entry.name()
             )));
         }
-        self.entries.insert(0, entry);
+        self.entries.push(entry);
         Ok(())
     }
 }

@@ -42,7 +42,15 @@ struct Tree {
     scale: f64,
     /// Radius of a sphere around everything, in that space.
     radius: f64,
+    /// Where the members of each distinct box begin, and the end of the last.
+    first: Vec<u32>,
+    /// Numbers of the boxes, those that coincide side by side.
+    members: Vec<u32>,
 }
+
+/// Stack of the thread that builds: the crate recurses as deep as its tree, which clusters of
+/// nearly coincident boxes make deep.
+const BUILD_STACK: usize = 1 << 28;
 
 impl Tree {
     fn build(boxes: &[Aabb]) -> Option<Self> {
@@ -59,16 +67,44 @@ impl Tree {
             .iter()
             .map(|b| TreeBox::new(local(b.min, -PAD), local(b.max, PAD)))
             .collect();
-        let params = if boxes.len() > 2_000_000 {
+        // Boxes that coincide cannot be told apart by any tree: it would become a chain. Each
+        // distinct box is entered once and leads to all of its members.
+        let key = |i: u32| {
+            let b = &boxes[i as usize];
+            [b.min.to_array(), b.max.to_array()].map(|c| c.map(f32::to_bits))
+        };
+        let mut members: Vec<u32> = (0..boxes.len() as u32).collect();
+        members.sort_unstable_by_key(|&i| (key(i), i));
+        let mut first = Vec::new();
+        let mut distinct = Vec::new();
+        for (at, &i) in members.iter().enumerate() {
+            if at == 0 || key(members[at - 1]) != key(i) {
+                first.push(at as u32);
+                distinct.push(boxes[i as usize]);
+            }
+        }
+        first.push(members.len() as u32);
+        let params = if distinct.len() > 2_000_000 {
             BvhBuildParams::fast_build()
         } else {
             BvhBuildParams::medium_build()
         };
+        let bvh = std::thread::scope(|scope| {
+            std::thread::Builder::new()
+                .stack_size(BUILD_STACK)
+                .spawn_scoped(scope, || {
+                    build_cwbvh(&distinct, params, &mut Duration::default())
+                })
+                .ok()
+                .and_then(|thread| thread.join().ok())
+        })?;
         Some(Self {
-            bvh: build_cwbvh(&boxes, params, &mut Duration::default()),
+            bvh,
             center,
             scale,
             radius: 0.5 * extent.length(),
+            first,
+            members,
         })
     }
 
@@ -104,8 +140,13 @@ impl Tree {
         let unit = Vec3A::from(unit.as_vec3()) + Vec3A::ZERO;
         let ray = TreeRay::new(start, unit, 0.0, end);
         let mut visit = |_: &TreeRay, id: usize| {
-            let i = self.bvh.primitive_indices[id] as usize;
-            test(i).map_or(f32::INFINITY, to_tree)
+            let group = self.bvh.primitive_indices[id] as usize;
+            let range = self.first[group] as usize..self.first[group + 1] as usize;
+            let nearest = self.members[range]
+                .iter()
+                .filter_map(|&i| test(i as usize))
+                .reduce(f64::min);
+            nearest.map_or(f32::INFINITY, to_tree)
         };
         if any {
             // Below the ray's end, whatever rounding made of it.
@@ -123,7 +164,12 @@ impl Tree {
 
     fn bytes(&self) -> u64 {
         let nodes = size_of_val(self.bvh.nodes.as_slice());
-        (nodes + size_of_val(self.bvh.primitive_indices.as_slice())) as u64
+        let lists = [&self.bvh.primitive_indices, &self.first, &self.members];
+        (nodes
+            + lists
+                .map(|l| size_of_val(l.as_slice()))
+                .iter()
+                .sum::<usize>()) as u64
     }
 }
 

@@ -19,7 +19,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<Ending> {
         &import_options(&args.scene),
         registry.scene.clone(),
     )?;
-    let effects = effects::survey(&scene, "auto")?;
+    let effects = effects::survey(&scene, "auto", &registry.effects)?;
     console::print(&describe(&scene, &effects.decisions))?;
     Ok(Ending::Done)
 }

@@ -14,6 +14,7 @@ use bitflags::bitflags;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::registry::Table;
 use crate::scene::{Census, Scene};
 
 bitflags! {
@@ -107,7 +108,7 @@ pub struct Effects {
 ///
 /// # Errors
 /// A wish that names no effect.
-pub fn survey(scene: &Scene, wish: &str) -> Result<Effects> {
+pub fn survey(scene: &Scene, wish: &str, table: &Table<EffectEntry>) -> Result<Effects> {
     let census = Census::new(scene);
     let mut forced = EffectSet::empty();
     let mut banned = EffectSet::empty();
@@ -129,23 +130,12 @@ pub fn survey(scene: &Scene, wish: &str) -> Result<Effects> {
                 )));
             }
         };
-        let entry =
-            EFFECTS
-                .iter()
-                .find(|e| e.name == name)
-                .ok_or_else(|| Error::UnknownPlugin {
-                    kind: "effect",
-                    name: name.into(),
-                    known: EFFECTS
-                        .iter()
-                        .map(|e| e.name)
-                        .collect::<Vec<_>>()
-                        .join(", "),
-                })?;
+        let entry = table.find(name)?;
         target.insert(entry.bit);
     }
     let mut set = EffectSet::empty();
-    let decisions = EFFECTS
+    let decisions = table
+        .entries()
         .iter()
         .map(|e| {
             let found = (e.verdict)(&census);

@@ -112,6 +112,7 @@ pub struct Film {
     sums: Vec<[f32; VALUES]>,
     counts: Vec<u32>,
     rejected: u64,
+    kept: [bool; 4],
 }
 
 impl Film {
@@ -124,7 +125,13 @@ impl Film {
             sums: vec![[0.0; VALUES]; n],
             counts: vec![0; n],
             rejected: 0,
+            kept: [true; 4],
         }
+    }
+
+    /// Keeps only these components of what is added from now on.
+    pub fn keep(&mut self, components: &[Component]) {
+        self.kept = Component::ALL.map(|c| components.contains(&c));
     }
 
     /// Width in pixels.
@@ -147,7 +154,12 @@ impl Film {
         for (k, sum) in tile.sums.iter().enumerate() {
             let (dx, dy) = (k as u32 % tile.width, k as u32 / tile.width);
             let i = (tile.y + dy) as usize * self.width as usize + (tile.x + dx) as usize;
-            let values = sum.values();
+            let mut values = sum.values();
+            for (k, kept) in self.kept.into_iter().enumerate() {
+                if !kept {
+                    values[3 * k..3 * k + 3].fill(0.0);
+                }
+            }
             if values.iter().all(|v| v.is_finite()) {
                 for (a, v) in self.sums[i].iter_mut().zip(values) {
                     *a += v;

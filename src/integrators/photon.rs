@@ -171,7 +171,8 @@ impl PhotonMapping<'_> {
                     out.add(to, beta * radiance);
                 }
             }
-            if !bsdf.has_specular() {
+            let chains = EffectSet::SPECULAR | EffectSet::REFRACTION;
+            if !bsdf.has_specular() || !cx.effects.intersects(chains) {
                 return;
             }
             let bsdf = bsdf.specular_only();
@@ -270,7 +271,11 @@ impl PhotonMapping<'_> {
         let n_gather = f64::from(gather_rays);
 
         // Shadow rays.
-        let n_shadow = rays(cx.settings.shadow_rays);
+        let n_shadow = if cx.effects.contains(EffectSet::DIRECT) {
+            rays(cx.settings.shadow_rays)
+        } else {
+            0
+        };
         for _ in 0..n_shadow {
             let u = sampler.next_2d();
             let sampled = sample_direct(cx, sp, bsdf, u, f64::from(n_shadow), n_gather);
@@ -457,8 +462,7 @@ impl PhotonMapping<'_> {
         let Some(map) = &maps.global else {
             return Rgb::ZERO;
         };
-        let all = maps.glow.is_none();
-        let keep = |class| all || class != PhotonClass::Caustic;
+        let keep = |class| class != PhotonClass::Caustic;
         let f = |wi| bsdf.diffuse_f(wi);
         map.estimate(here, &mut scratch.nearest, keep, f).value
     }

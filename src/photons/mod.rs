@@ -1,5 +1,5 @@
 //! Pass 1 of photon mapping: photons leave the lights, are followed through the scene and stored
-//! where they meet diffuse surfaces, in two maps (Jensen 1996).
+//! where they meet diffuse surfaces, in three maps (after Jensen 1996).
 //!
 //! Path space, written from the camera E to the light L with D for a diffuse scattering and S
 //! for any other:
@@ -60,8 +60,8 @@ pub struct PhotonMaps {
     pub irradiance: Option<IrradianceMap>,
     /// Photons that came by specular surfaces only.
     pub caustic: Option<PhotonMap>,
-    /// Irradiance from caustics one diffuse surface away; if present, the irradiance of the
-    /// global photons leaves those out that are caustic themselves.
+    /// Irradiance from caustics one diffuse surface away; the irradiance of the global photons
+    /// always leaves those out that are caustic themselves.
     pub glow: Option<IrradianceMap>,
     /// What became of the global photons.
     pub global_counts: PhotonCounts,
@@ -118,8 +118,7 @@ pub fn trace_photons(
         maps.global_counts = pass.counts;
         let map = PhotonMap::build(pass.photons, settings.nearest, area);
         if gather {
-            let all = maps.glow.is_none();
-            let keep = |class| all || class != PhotonClass::Caustic;
+            let keep = |class| class != PhotonClass::Caustic;
             maps.irradiance = Some(IrradianceMap::build(&map, keep, control));
         }
         maps.global = Some(map);

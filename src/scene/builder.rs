@@ -1,9 +1,9 @@
 //! The one way to make a [`Scene`].
 //!
 //! Shapes come in their own space with placements in `f64`. What is placed once is moved to
-//! world space; what is placed more often stays an instance. All positions are taken relative
-//! to the centre of the scene before they are rounded to single precision, so that a scene far
-//! from the origin keeps its digits.
+//! world space; what is placed more often stays an instance. In a scene far from the origin all
+//! positions are taken relative to its centre before they are rounded to single precision, so
+//! that it keeps its digits.
 
 use std::sync::Arc;
 
@@ -197,7 +197,8 @@ impl SceneBuilder {
         })
     }
 
-    /// Centre of the world-space boxes of all placements, in `f64`.
+    /// What is subtracted from all positions: the centre of the world-space boxes of all
+    /// placements, in `f64`, if it is farther from the origin than the scene is large.
     fn world_center(&self) -> DVec3 {
         let mut all = Aabb::EMPTY;
         let mut local: Vec<Option<Aabb>> = vec![None; self.shapes.len()];
@@ -220,7 +221,10 @@ impl SceneBuilder {
                 }
             }
         }
-        all.center()
+        let center = all.center();
+        // Around the origin nothing is gained, and the file's coordinates stay as they are.
+        let near = center.abs().max_element() <= all.extent().max_element();
+        if near { DVec3::ZERO } else { center }
     }
 
     fn bake(&mut self, center: DVec3) -> Geometry {

@@ -9,7 +9,7 @@ use dualight::math::{DAffine3, DVec3};
 use dualight::scene::{MeshPlacement, Scene, SceneBuilder};
 
 /// A Lambert surface.
-pub fn lambert(name: &str, albedo: Rgb) -> MaterialDesc {
+pub(crate) fn lambert(name: &str, albedo: Rgb) -> MaterialDesc {
     MaterialDesc {
         name: name.into(),
         base_color: albedo,
@@ -20,7 +20,7 @@ pub fn lambert(name: &str, albedo: Rgb) -> MaterialDesc {
 }
 
 /// A perfect mirror.
-pub fn mirror() -> MaterialDesc {
+pub(crate) fn mirror() -> MaterialDesc {
     MaterialDesc {
         name: "mirror".into(),
         roughness: 0.0,
@@ -29,7 +29,7 @@ pub fn mirror() -> MaterialDesc {
 }
 
 /// Clear solid glass.
-pub fn glass(ior: f64) -> MaterialDesc {
+pub(crate) fn glass(ior: f64) -> MaterialDesc {
     MaterialDesc {
         name: "glass".into(),
         metallic: 0.0,
@@ -42,7 +42,7 @@ pub fn glass(ior: f64) -> MaterialDesc {
 }
 
 /// A black surface that emits from its front.
-pub fn lamp(radiance: Rgb) -> MaterialDesc {
+pub(crate) fn lamp(radiance: Rgb) -> MaterialDesc {
     MaterialDesc {
         emission: radiance,
         ..lambert("lamp", Rgb::ZERO)
@@ -50,7 +50,7 @@ pub fn lamp(radiance: Rgb) -> MaterialDesc {
 }
 
 /// Adds a parallelogram; its front is where `e1 × e2` points.
-pub fn add_quad(
+pub(crate) fn add_quad(
     b: &mut SceneBuilder,
     name: &str,
     material: MaterialId,
@@ -70,7 +70,7 @@ pub fn add_quad(
 }
 
 /// Adds a sphere.
-pub fn add_sphere(b: &mut SceneBuilder, name: &str, material: MaterialId, c: DVec3, r: f64) {
+pub(crate) fn add_sphere(b: &mut SceneBuilder, name: &str, material: MaterialId, c: DVec3, r: f64) {
     let set = SphereSet {
         spheres: vec![[c.x as f32, c.y as f32, c.z as f32, r as f32]],
     };
@@ -93,7 +93,7 @@ fn place(
 }
 
 /// A perspective camera at `eye` looking along `-z`.
-pub fn camera(eye: DVec3, yfov_degrees: f64) -> CameraDesc {
+pub(crate) fn camera(eye: DVec3, yfov_degrees: f64) -> CameraDesc {
     CameraDesc {
         name: "camera".into(),
         kind: "perspective",
@@ -104,7 +104,7 @@ pub fn camera(eye: DVec3, yfov_degrees: f64) -> CameraDesc {
 }
 
 /// The paper's box: a diffuse, a mirror and a glass ball under a square lamp.
-pub fn box_scene() -> Scene {
+pub(crate) fn box_scene() -> Scene {
     let mut b = SceneBuilder::default();
     let grey = b.add_material(&lambert("grey", Rgb::splat(0.75))).unwrap();
     let red = b
