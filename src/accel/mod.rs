@@ -12,6 +12,7 @@
 //! - of several primitives at the same distance any one may be named, but always the same one
 //!   for the same ray.
 
+mod bvh;
 mod linear;
 
 use std::sync::Arc;
@@ -58,4 +59,4 @@ pub struct AcceleratorEntry {
 crate::registry::impl_entry!(AcceleratorEntry, "accelerator");
 
 /// The backends; the first is the default, `linear` is the oracle of the tests.
-pub static ACCELERATORS: &[AcceleratorEntry] = &[linear::ENTRY];
+pub static ACCELERATORS: &[AcceleratorEntry] = &[bvh::ENTRY, linear::ENTRY];
