@@ -61,7 +61,7 @@ fn box_scene() -> Geometry {
     g
 }
 
-/// A million triangles: a bumpy closed sphere inside the box's extent.
+/// About `4n²` triangles: a bumpy closed sphere inside the box's extent.
 fn bumpy(n: u32) -> Geometry {
     let mut mesh = TriangleMesh::default();
     for j in 0..=n {
@@ -122,7 +122,11 @@ fn main() {
         "{:<8} {:<8} {:>10} {:>9} {:>10} {:>10} {:>9}",
         "scene", "backend", "triangles", "build s", "closest/s", "any/s", "bytes"
     );
-    for (name, geometry) in [("box", box_scene()), ("mesh", bumpy(500))] {
+    for (name, geometry) in [
+        ("box", box_scene()),
+        ("mesh", bumpy(50)),
+        ("mesh", bumpy(500)),
+    ] {
         let geometry = Arc::new(geometry);
         let rays = rays(200_000, 7);
         let built: Vec<(&str, Box<dyn Accelerator>)> = ACCELERATORS

@@ -97,8 +97,13 @@ impl Watertight {
     /// The hit with the triangle `v` in `tmin ≤ t ≤ tmax`; edges and vertices count as inside.
     #[inline]
     pub fn intersect(&self, v: [DVec3; 3], tmin: f64, tmax: f64) -> Option<TriangleHit> {
-        let relative = |v: DVec3| self.axes.map(|k| v[k] - self.o[k]);
-        self.intersect_relative(v.map(relative), tmin, tmax)
+        let [kx, ky, kz] = self.axes;
+        let relative = |v: DVec3| {
+            let r = v - self.o;
+            [r[kx], r[ky], r[kz]]
+        };
+        let v = [relative(v[0]), relative(v[1]), relative(v[2])];
+        self.intersect_relative(v, tmin, tmax)
     }
 
     /// The same, bit for bit, for corners in single precision: coordinates are picked where they

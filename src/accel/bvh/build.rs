@@ -39,11 +39,12 @@ impl Ref {
         self.max = self.max.max(other.max);
     }
 
-    /// Half the area, with lengths in units of `1 / scale`.
+    /// Half the area, with lengths in units of `1 / scale`; a touch of length keeps boxes apart
+    /// that have no area.
     #[inline]
     fn half_area(&self, scale: f32) -> f32 {
         let e = (self.max - self.min) * scale;
-        e.x * e.y + e.y * e.z + e.z * e.x
+        e.x * e.y + e.y * e.z + e.z * e.x + 1e-4 * (e.x + e.y + e.z)
     }
 
     #[inline]
