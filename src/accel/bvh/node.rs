@@ -163,8 +163,8 @@ pub(super) fn traverse(
                 let near = near.to_array();
                 let mut best = mask.trailing_zeros() as usize & 3;
                 mask &= mask - 1;
-                // The nearest is next; the others wait in no particular order but for a swap
-                // that keeps the nearer of two on top.
+                // The nearest is next; the others wait, nearer ones above.
+                let base = stack.len();
                 while mask != 0 {
                     let i = mask.trailing_zeros() as usize & 3;
                     mask &= mask - 1;
@@ -173,13 +173,13 @@ pub(super) fn traverse(
                         wait = best;
                         best = i;
                     }
-                    let mut entry = (node.child[wait], near[wait]);
-                    if let Some(top) = stack.last_mut()
-                        && stack_order(top, &entry)
-                    {
-                        std::mem::swap(top, &mut entry);
+                    stack.push((node.child[wait], near[wait]));
+                }
+                let new = &mut stack[base..];
+                for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+                    if j < new.len() && new[i].1 < new[j].1 {
+                        new.swap(i, j);
                     }
-                    stack.push(entry);
                 }
                 current = node.child[best];
                 continue;
@@ -195,11 +195,6 @@ pub(super) fn traverse(
             }
         }
     }
-}
-
-#[inline(always)]
-fn stack_order(top: &(u32, f32), entry: &(u32, f32)) -> bool {
-    top.1 < entry.1
 }
 
 #[cfg(test)]
