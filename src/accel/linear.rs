@@ -46,7 +46,7 @@ pub(super) fn intersect_prim(
 pub(super) struct PreparedRay {
     pub(super) o: DVec3,
     pub(super) d: DVec3,
-    watertight: Watertight,
+    pub(super) watertight: Watertight,
 }
 
 impl PreparedRay {

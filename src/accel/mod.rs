@@ -2,7 +2,8 @@
 //! one file and one line in [`ACCELERATORS`].
 //!
 //! The contract, which all of them obey:
-//! - the segment is `tmin ≤ t ≤ tmax`, both ends included, `t` in units of `|d|`;
+//! - the segment is `tmin ≤ t ≤ tmax`, `tmin ≥ 0`, both ends included (in Embree up to its
+//!   rounding), `t` in units of `|d|`;
 //! - an invalid ray ([`Ray::is_valid`]) hits nothing;
 //! - every primitive is hit from both sides; a sphere is hit where the ray enters and where it
 //!   leaves;

@@ -3,7 +3,7 @@
 use super::object::Placement;
 use super::{Hit, Object, Ray, Shape, sphere, triangle};
 use crate::ad::V3;
-use crate::math::{DVec3, larger, robust};
+use crate::math::{DVec3, larger, max_abs, robust};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -91,7 +91,7 @@ impl SurfacePoint {
             front: wo.dot(on.ng) > 0.0,
             distance: on.t * length,
             uv: on.uv,
-            offset: robust::spawn_offset(on.p, on.center, on.size),
+            offset: robust::spawn_offset(on.p, on.reach),
             prim: hit.prim,
             object: hit.object,
             material: object.material,
@@ -145,8 +145,8 @@ struct Refined {
     ng: DVec3,
     n: DVec3,
     uv: [f64; 2],
-    center: DVec3,
-    size: f64,
+    /// Bound on the coordinates that a backend computes with, in world units.
+    reach: f64,
 }
 
 #[inline(always)]
@@ -178,15 +178,15 @@ fn refine_local(
                 .normal(prim, b1, b2)
                 .and_then(DVec3::try_normalize)
                 .unwrap_or(ng);
-            let (center, size) = local_scale(place);
+            // A backend's rounding grows with the corners, which can be far from the point.
+            let far = larger(larger(max_abs(v[0]), max_abs(v[1])), max_abs(v[2]));
             Refined {
                 t,
                 p: v[0] + e1 * b1 + e2 * b2,
                 ng,
                 n,
                 uv: mesh.uv(prim, b1, b2),
-                center,
-                size,
+                reach: reach(far, place),
             }
         }
         Shape::Spheres(set) => {
@@ -204,26 +204,29 @@ fn refine_local(
                 None => line.t_closest,
             };
             let n = (o + d * t - c).try_normalize().unwrap_or(DVec3::Z);
-            let (center, size) = local_scale(place);
             Refined {
                 t,
                 p: c + n * r,
                 ng: n,
                 n,
                 uv: [0.0; 2],
-                center: if place.is_some() { center } else { c },
-                size: size + r * place.map_or(1.0, |p| p.world_from_object.matrix3.x_axis.length()),
+                reach: reach(max_abs(c) + r, place),
             }
         }
     }
 }
 
-/// What the rounding of an instance's transform scales with: its translation.
+/// A bound `local` on coordinates in the shape's space, carried to the world.
 #[inline]
-fn local_scale(place: Option<&Placement>) -> (DVec3, f64) {
-    place.map_or((DVec3::ZERO, 0.0), |p| {
-        (p.world_from_object.translation, 0.0)
-    })
+fn reach(local: f64, place: Option<&Placement>) -> f64 {
+    match place {
+        None => local,
+        Some(p) => {
+            let m = &p.world_from_object.matrix3;
+            let stretch = m.x_axis.length() + m.y_axis.length() + m.z_axis.length();
+            local * stretch + max_abs(p.world_from_object.translation)
+        }
+    }
 }
 
 #[inline]

@@ -54,6 +54,8 @@ pub fn plane_hit<R: Real>(
 pub struct Watertight {
     o: DVec3,
     axes: [usize; 3],
+    /// The origin's coordinates along `axes`.
+    permuted: DVec3,
     shear: DVec3,
 }
 
@@ -88,28 +90,50 @@ impl Watertight {
         Self {
             o,
             axes: [kx, ky, kz],
+            permuted: DVec3::new(o[kx], o[ky], o[kz]),
             shear: DVec3::new(d[kx] * inv, d[ky] * inv, inv),
         }
     }
 
+    /// A point relative to the origin, its coordinates given along `axes`.
     #[inline]
-    fn project(&self, v: DVec3) -> [f64; 3] {
-        let r = v - self.o;
-        let [kx, ky, kz] = self.axes;
-        let z = r[kz];
-        [
-            r[kx] - self.shear.x * z,
-            r[ky] - self.shear.y * z,
-            z * self.shear.z,
-        ]
+    fn shear(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        [x - self.shear.x * z, y - self.shear.y * z, z * self.shear.z]
     }
 
     /// The hit with the triangle `v` in `tmin ≤ t ≤ tmax`; edges and vertices count as inside.
     #[inline]
     pub fn intersect(&self, v: [DVec3; 3], tmin: f64, tmax: f64) -> Option<TriangleHit> {
-        let [ax, ay, az] = self.project(v[0]);
-        let [bx, by, bz] = self.project(v[1]);
-        let [cx, cy, cz] = self.project(v[2]);
+        let [kx, ky, kz] = self.axes;
+        let relative = |v: DVec3| {
+            let r = v - self.o;
+            [r[kx], r[ky], r[kz]]
+        };
+        let v = [relative(v[0]), relative(v[1]), relative(v[2])];
+        self.intersect_relative(v, tmin, tmax)
+    }
+
+    /// The same, bit for bit, for corners in single precision: coordinates are picked where they
+    /// lie in memory, which is faster than out of a vector register.
+    #[inline]
+    pub fn intersect_single(&self, v: &[[f32; 3]; 3], tmin: f64, tmax: f64) -> Option<TriangleHit> {
+        let [kx, ky, kz] = self.axes;
+        let relative = |v: &[f32; 3]| {
+            [
+                f64::from(v[kx]) - self.permuted.x,
+                f64::from(v[ky]) - self.permuted.y,
+                f64::from(v[kz]) - self.permuted.z,
+            ]
+        };
+        let v = [relative(&v[0]), relative(&v[1]), relative(&v[2])];
+        self.intersect_relative(v, tmin, tmax)
+    }
+
+    #[inline(always)]
+    fn intersect_relative(&self, v: [[f64; 3]; 3], tmin: f64, tmax: f64) -> Option<TriangleHit> {
+        let [ax, ay, az] = self.shear(v[0]);
+        let [bx, by, bz] = self.shear(v[1]);
+        let [cx, cy, cz] = self.shear(v[2]);
         let u = cx * by - cy * bx;
         let w = bx * ay - by * ax;
         let v = ax * cy - ay * cx;

@@ -139,7 +139,7 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
                 e1,
                 e2,
                 ng: cross.normalize_or_zero(),
-                offset: robust::spawn_offset(DVec3::splat(far), DVec3::ZERO, 0.0),
+                offset: robust::spawn_offset(DVec3::ZERO, far),
             }
         })
         .collect();

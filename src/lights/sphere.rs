@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
 use crate::color::Rgb;
 use crate::geometry::SurfacePoint;
-use crate::math::{BoundingSphere, DVec3, Frame, robust};
+use crate::math::{BoundingSphere, DVec3, Frame, max_abs, robust};
 use crate::sampling::{Discrete, warp};
 
 struct SphereLight {
@@ -24,7 +24,7 @@ fn cone_complement(s: &BoundingSphere, d2: f64) -> f64 {
 
 impl SphereLight {
     fn offset(s: &BoundingSphere) -> f64 {
-        robust::spawn_offset(s.center, s.center, s.radius)
+        robust::spawn_offset(DVec3::ZERO, max_abs(s.center) + s.radius)
     }
 
     /// Density of [`Light::sample_li`] once sphere `s` is chosen, for `cos` at the light.
