@@ -218,7 +218,9 @@ fn a_glass_slab_passes_what_incoherent_reflections_leave() {
     for thickness in [1.0, 1e-2, 1e-4] {
         let mut b = SceneBuilder::default();
         let m = b.add_material(&glass(1.5)).unwrap();
-        let (s, t) = (1e3, DVec3::Z * thickness);
+        // Rays start off a surface by what its corners' coordinates round to: the slab must be
+        // thicker than that.
+        let (s, t) = (1e3 * thickness, DVec3::Z * thickness);
         let corner = DVec3::new(-s, -s, 0.0);
         add_quad(
             &mut b,

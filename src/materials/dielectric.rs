@@ -11,7 +11,8 @@ use crate::geometry::SurfacePoint;
 pub(super) struct Interface {
     ior: f64,
     tint: Rgb,
-    transmission: f64,
+    /// Share of the surface that transmits: neither metal nor opaque.
+    share: f64,
     alpha: f64,
     smooth: bool,
     thin: bool,
@@ -28,7 +29,7 @@ impl Interface {
         Ok(Self {
             ior: d.ior,
             tint: d.base_color,
-            transmission: d.transmission * (1.0 - d.metallic),
+            share: d.transmission * (1.0 - d.metallic),
             alpha: d.roughness.max(MaterialDesc::SMOOTH).powi(2),
             smooth: d.is_smooth(),
             thin: !d.volume,
@@ -45,18 +46,16 @@ impl Interface {
             (true, _) => ThinDielectric {
                 eta: self.ior,
                 tint: self.tint,
-                transmission: self.transmission,
+                share: self.share,
             }
             .into(),
             (false, true) => SmoothDielectric {
                 eta,
                 tint: self.tint,
-                transmission: self.transmission,
+                share: self.share,
             }
             .into(),
-            (false, false) => {
-                GgxDielectric::new(self.alpha, eta, self.tint, self.transmission).into()
-            }
+            (false, false) => GgxDielectric::new(self.alpha, eta, self.tint, self.share).into(),
         }
     }
 

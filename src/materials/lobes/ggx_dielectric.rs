@@ -14,28 +14,28 @@ pub struct GgxDielectric {
     ggx: Ggx,
     eta: f64,
     tint: Rgb,
-    transmission: f64,
+    share: f64,
 }
 
 impl GgxDielectric {
-    /// Width `alpha > 0`; `eta`, `tint` and `transmission` as in
+    /// Width `alpha > 0`; `eta`, `tint` and `share` as in
     /// [`SmoothDielectric`](super::SmoothDielectric).
     #[inline]
-    pub fn new(alpha: f64, eta: f64, tint: Rgb, transmission: f64) -> Self {
+    pub fn new(alpha: f64, eta: f64, tint: Rgb, share: f64) -> Self {
         Self {
             ggx: Ggx { alpha },
             eta,
             tint,
-            transmission,
+            share,
         }
     }
 
-    /// Probability of reflecting, and reflectance plus transmitted share, at a microfacet.
+    /// Probability of reflecting, and the sum of what is reflected and transmitted, at a
+    /// microfacet.
     #[inline]
     fn split(&self, cos: f64) -> (f64, f64, fresnel::Dielectric) {
         let f = fresnel::dielectric(cos, self.eta);
-        let sum = f.reflectance + f.transmittance * self.transmission;
-        (f.reflectance / sum, sum, f)
+        (f.reflectance, self.share, f)
     }
 }
 
@@ -51,7 +51,8 @@ impl LobeModel for GgxDielectric {
             let h = (wo + wi).normalize();
             let cos_h = wo.dot(h);
             let (p_reflect, _, f) = self.split(cos_h);
-            let value = self.ggx.d(h) * self.ggx.g2(wo, wi) * f.reflectance / (4.0 * wo.z * wi.z);
+            let value = self.ggx.d(h) * self.ggx.g2(wo, wi) * f.reflectance * self.share
+                / (4.0 * wo.z * wi.z);
             let pdf = self.ggx.visible_pdf(wo, h) / (4.0 * cos_h) * p_reflect;
             return (Rgb::splat(value), pdf);
         }
@@ -67,7 +68,7 @@ impl LobeModel for GgxDielectric {
         let (p_reflect, _, f) = self.split(oh);
         let denom = ih + oh / self.eta;
         let jacobian = ih.abs() / (denom * denom);
-        let through = f.transmittance * self.transmission;
+        let through = f.transmittance * self.share;
         let value =
             self.ggx.d(h) * self.ggx.g2(wo, wi) * through * jacobian * oh / (wo.z * wi.z.abs());
         let pdf = self.ggx.visible_pdf(wo, h) * jacobian * (1.0 - p_reflect);
@@ -104,7 +105,7 @@ impl LobeModel for GgxDielectric {
     #[inline]
     fn albedo(&self, wo: DVec3) -> Rgb {
         let (_, _, f) = self.split(wo.z);
-        Rgb::splat(f.reflectance) + self.tint * (f.transmittance * self.transmission)
+        (Rgb::splat(f.reflectance) + self.tint * f.transmittance) * self.share
     }
 
     #[inline]

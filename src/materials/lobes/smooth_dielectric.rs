@@ -12,8 +12,8 @@ pub struct SmoothDielectric {
     pub eta: f64,
     /// Colour of what is refracted.
     pub tint: Rgb,
-    /// Share of what is not reflected that is refracted; the rest is left to other lobes.
-    pub transmission: f64,
+    /// Share of the surface that is this interface; the rest is left to other lobes.
+    pub share: f64,
 }
 
 impl LobeModel for SmoothDielectric {
@@ -38,10 +38,10 @@ impl LobeModel for SmoothDielectric {
         let mut out = Branches::new();
         out.push(LobeSample {
             wi: DVec3::new(-wo.x, -wo.y, wo.z),
-            weight: Rgb::splat(f.reflectance),
+            weight: Rgb::splat(f.reflectance * self.share),
             pdf: 0.0,
         });
-        let through = f.transmittance * self.transmission;
+        let through = f.transmittance * self.share;
         if through > 0.0 {
             let inv = 1.0 / self.eta;
             out.push(LobeSample {
@@ -56,7 +56,7 @@ impl LobeModel for SmoothDielectric {
     #[inline]
     fn albedo(&self, wo: DVec3) -> Rgb {
         let f = fresnel::dielectric(wo.z, self.eta);
-        Rgb::splat(f.reflectance) + self.tint * (f.transmittance * self.transmission)
+        (Rgb::splat(f.reflectance) + self.tint * f.transmittance) * self.share
     }
 
     #[inline]

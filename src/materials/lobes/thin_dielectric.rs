@@ -13,8 +13,8 @@ pub struct ThinDielectric {
     pub eta: f64,
     /// Colour of what passes.
     pub tint: Rgb,
-    /// Share of what is not reflected that passes.
-    pub transmission: f64,
+    /// Share of the surface that is this pane; the rest is left to other lobes.
+    pub share: f64,
 }
 
 impl ThinDielectric {
@@ -23,8 +23,8 @@ impl ThinDielectric {
         let f = fresnel::dielectric(cos, self.eta);
         let sum = 1.0 + f.reflectance;
         (
-            2.0 * f.reflectance / sum,
-            f.transmittance / sum * self.transmission,
+            2.0 * f.reflectance / sum * self.share,
+            f.transmittance / sum * self.share,
         )
     }
 }
