@@ -1,15 +1,25 @@
-//! Scenes made in code, for tests.
+//! What tests share: scenes made in code, tiny renderings, statistics.
 #![allow(dead_code, reason = "each test binary uses its own part")]
+#![allow(
+    unreachable_pub,
+    reason = "shared by binaries, each a crate of its own"
+)]
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+pub mod points;
+pub mod render;
+pub mod stats;
 
 use dualight::cameras::CameraDesc;
 use dualight::color::Rgb;
 use dualight::geometry::{MaterialId, SphereSet, TriangleMesh};
+use dualight::lights::LightDesc;
 use dualight::materials::MaterialDesc;
-use dualight::math::{DAffine3, DVec3};
+use dualight::math::{DAffine3, DVec3, Frame};
 use dualight::scene::{MeshPlacement, Scene, SceneBuilder};
 
 /// A Lambert surface.
-pub(crate) fn lambert(name: &str, albedo: Rgb) -> MaterialDesc {
+pub fn lambert(name: &str, albedo: Rgb) -> MaterialDesc {
     MaterialDesc {
         name: name.into(),
         base_color: albedo,
@@ -20,7 +30,7 @@ pub(crate) fn lambert(name: &str, albedo: Rgb) -> MaterialDesc {
 }
 
 /// A perfect mirror.
-pub(crate) fn mirror() -> MaterialDesc {
+pub fn mirror() -> MaterialDesc {
     MaterialDesc {
         name: "mirror".into(),
         roughness: 0.0,
@@ -29,7 +39,7 @@ pub(crate) fn mirror() -> MaterialDesc {
 }
 
 /// Clear solid glass.
-pub(crate) fn glass(ior: f64) -> MaterialDesc {
+pub fn glass(ior: f64) -> MaterialDesc {
     MaterialDesc {
         name: "glass".into(),
         metallic: 0.0,
@@ -42,7 +52,7 @@ pub(crate) fn glass(ior: f64) -> MaterialDesc {
 }
 
 /// A black surface that emits from its front.
-pub(crate) fn lamp(radiance: Rgb) -> MaterialDesc {
+pub fn lamp(radiance: Rgb) -> MaterialDesc {
     MaterialDesc {
         emission: radiance,
         ..lambert("lamp", Rgb::ZERO)
@@ -50,7 +60,7 @@ pub(crate) fn lamp(radiance: Rgb) -> MaterialDesc {
 }
 
 /// Adds a parallelogram; its front is where `e1 × e2` points.
-pub(crate) fn add_quad(
+pub fn add_quad(
     b: &mut SceneBuilder,
     name: &str,
     material: MaterialId,
@@ -70,7 +80,7 @@ pub(crate) fn add_quad(
 }
 
 /// Adds a sphere.
-pub(crate) fn add_sphere(b: &mut SceneBuilder, name: &str, material: MaterialId, c: DVec3, r: f64) {
+pub fn add_sphere(b: &mut SceneBuilder, name: &str, material: MaterialId, c: DVec3, r: f64) {
     let set = SphereSet {
         spheres: vec![[c.x as f32, c.y as f32, c.z as f32, r as f32]],
     };
@@ -93,7 +103,7 @@ fn place(
 }
 
 /// A perspective camera at `eye` looking along `-z`.
-pub(crate) fn camera(eye: DVec3, yfov_degrees: f64) -> CameraDesc {
+pub fn camera(eye: DVec3, yfov_degrees: f64) -> CameraDesc {
     CameraDesc {
         name: "camera".into(),
         kind: "perspective",
@@ -103,8 +113,84 @@ pub(crate) fn camera(eye: DVec3, yfov_degrees: f64) -> CameraDesc {
     }
 }
 
+/// A camera at `eye` that looks at `target`, of a kind of the table; `vertical` as there.
+pub fn look_at(kind: &'static str, eye: DVec3, target: DVec3, vertical: f64) -> CameraDesc {
+    let up = if (target - eye).normalize().y.abs() < 0.9 {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    let z = (eye - target).normalize();
+    let x = up.cross(z).normalize();
+    CameraDesc {
+        name: "camera".into(),
+        kind,
+        world_from_camera: DAffine3::from_cols(x, z.cross(x), z, eye),
+        vertical,
+        aspect: Some(1.0),
+    }
+}
+
+/// Adds the six sides of a box of half width `h` around the origin, fronts inward.
+pub fn add_room(b: &mut SceneBuilder, material: MaterialId, h: f64) {
+    for (name, axis, side) in [("x", 0, 1.0), ("y", 1, 1.0), ("z", 2, 1.0)]
+        .into_iter()
+        .flat_map(|(n, a, s)| [(n, a, s), (n, a, -s)])
+    {
+        let e = |k: usize| DVec3::AXES[(axis + k) % 3];
+        // The cross product of the edges points to the origin.
+        let (e1, e2) = if side > 0.0 {
+            (e(2), e(1))
+        } else {
+            (e(1), e(2))
+        };
+        let corner = (e(0) * side - e(1) - e(2)) * h;
+        add_quad(b, name, material, corner, e1 * (2.0 * h), e2 * (2.0 * h));
+    }
+}
+
+/// Adds a polygon of `n` sides with the area of a disc of radius `r`; its front is toward the
+/// unit vector `axis`.
+pub fn add_disc(
+    b: &mut SceneBuilder,
+    name: &str,
+    material: MaterialId,
+    center: DVec3,
+    axis: DVec3,
+    r: f64,
+) {
+    const N: u32 = 128;
+    let turn = std::f64::consts::TAU / f64::from(N);
+    let r = r * (turn / turn.sin()).sqrt();
+    let frame = Frame::from_normal(axis);
+    let mut positions: Vec<[f32; 3]> = vec![center.as_vec3().into()];
+    positions.extend((0..N).map(|i| {
+        let (s, c) = (f64::from(i) * turn).sin_cos();
+        <[f32; 3]>::from((center + (frame.x * c + frame.y * s) * r).as_vec3())
+    }));
+    let mesh = TriangleMesh {
+        positions,
+        indices: (0..N).map(|i| [0, 1 + i, 1 + (i + 1) % N]).collect(),
+        ..Default::default()
+    };
+    let shape = b.add_mesh(mesh, name);
+    place(b, name, shape, material);
+}
+
+/// A light without surface that shines white.
+pub fn light(kind: &'static str, position: DVec3, direction: DVec3, strength: f64) -> LightDesc {
+    LightDesc {
+        kind,
+        name: kind.into(),
+        position,
+        direction,
+        strength: Rgb::splat(strength),
+        ..Default::default()
+    }
+}
+
 /// The paper's box: a diffuse, a mirror and a glass ball under a square lamp.
-pub(crate) fn box_scene() -> Scene {
+pub fn box_scene() -> Scene {
     let mut b = SceneBuilder::default();
     let grey = b.add_material(&lambert("grey", Rgb::splat(0.75))).unwrap();
     let red = b

@@ -1,0 +1,132 @@
+//! Surface points and materials for tests of scattering, without a scene.
+
+use dualight::color::Rgb;
+use dualight::geometry::{MaterialId, ObjectId, SurfacePoint};
+use dualight::materials::{Bsdf, MATERIALS, Material, MaterialDesc, TransportMode};
+use dualight::math::DVec3;
+
+/// A point of the plane `z = 0` seen along `wo`, with shading normal `n`.
+pub fn point_with_normal(wo: DVec3, n: DVec3) -> SurfacePoint {
+    SurfacePoint {
+        p: DVec3::ZERO,
+        ng: DVec3::Z,
+        n,
+        wo,
+        front: wo.z > 0.0,
+        distance: 1.0,
+        uv: [0.0; 2],
+        offset: 0.0,
+        prim: 0,
+        object: ObjectId(0),
+        material: MaterialId(0),
+        light: None,
+    }
+}
+
+/// A point of the plane `z = 0` seen along `wo`.
+pub fn point(wo: DVec3) -> SurfacePoint {
+    point_with_normal(wo, DVec3::Z)
+}
+
+/// The direction at the cosine `cos` to `z`, turned by `phi`; `cos < 0` is behind.
+pub fn direction(cos: f64, phi: f64) -> DVec3 {
+    let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
+    DVec3::new(sin * phi.cos(), sin * phi.sin(), cos)
+}
+
+/// A material to test, with what the tests must know of it.
+pub struct Specimen {
+    pub name: String,
+    pub material: Box<dyn Material>,
+    pub desc: MaterialDesc,
+    /// Whether the back is worth looking at.
+    pub both_sides: bool,
+}
+
+impl Specimen {
+    /// The scattering function seen along `wo`.
+    pub fn bsdf(&self, wo: DVec3, mode: TransportMode) -> Bsdf {
+        self.material.bsdf(&point(wo), mode)
+    }
+}
+
+/// Every material kind of the table in several versions, at the given roughnesses where it has
+/// one. A kind that is added to the table is tested with general parameters.
+pub fn specimens(roughnesses: &[f64]) -> Vec<Specimen> {
+    let base = |roughness: f64| MaterialDesc {
+        roughness,
+        base_color: Rgb::new(0.8, 0.5, 0.2),
+        ..Default::default()
+    };
+    let mut out = Vec::new();
+    for entry in MATERIALS {
+        let mut add = |what: &str, both_sides: bool, desc: MaterialDesc| {
+            out.push(Specimen {
+                name: format!("{} {what}", entry.name),
+                material: (entry.build)(&desc).expect("valid parameters"),
+                desc,
+                both_sides,
+            });
+        };
+        match entry.name {
+            "lambert" => add(
+                "",
+                false,
+                MaterialDesc {
+                    specular: 0.0,
+                    metallic: 0.0,
+                    ..base(1.0)
+                },
+            ),
+            "mirror" => add("", false, base(0.0)),
+            "conductor" => {
+                for &r in roughnesses {
+                    add(&format!("roughness {r}"), false, base(r));
+                }
+            }
+            "dielectric" => {
+                let glass = |r| MaterialDesc {
+                    metallic: 0.0,
+                    transmission: 1.0,
+                    volume: true,
+                    base_color: Rgb::ONE,
+                    ..base(r)
+                };
+                add("smooth", true, glass(0.0));
+                add(
+                    "thin",
+                    true,
+                    MaterialDesc {
+                        volume: false,
+                        ..glass(0.0)
+                    },
+                );
+                for &r in roughnesses {
+                    add(&format!("roughness {r}"), true, glass(r));
+                }
+            }
+            _ => {
+                for &r in roughnesses {
+                    let plastic = MaterialDesc {
+                        metallic: 0.0,
+                        ..base(r)
+                    };
+                    let mixed = MaterialDesc {
+                        metallic: 0.5,
+                        ..base(r)
+                    };
+                    let milk = MaterialDesc {
+                        transmission: 0.6,
+                        volume: true,
+                        metallic: 0.2,
+                        ..base(r)
+                    };
+                    add(&format!("plastic, roughness {r}"), false, plastic);
+                    add(&format!("half metal, roughness {r}"), false, mixed);
+                    add(&format!("half glass, roughness {r}"), true, milk);
+                }
+            }
+        }
+    }
+    out
+}
