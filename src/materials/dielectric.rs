@@ -31,7 +31,8 @@ impl Interface {
             tint: d.base_color,
             share: d.transmission * (1.0 - d.metallic),
             alpha: d.roughness.max(MaterialDesc::SMOOTH).powi(2),
-            smooth: d.is_smooth(),
+            // Index 1 bends nothing, however rough: a delta that light sampling leaves alone.
+            smooth: d.is_smooth() || d.ior == 1.0,
             thin: !d.volume,
         })
     }
