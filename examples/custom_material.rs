@@ -9,7 +9,7 @@ use std::sync::Arc;
 use dualight::cameras::CameraDesc;
 use dualight::color::{Rgb, linear_to_srgb};
 use dualight::control::Control;
-use dualight::geometry::{SphereSet, SurfacePoint};
+use dualight::geometry::{SphereSet, Surface};
 use dualight::lights::LightDesc;
 use dualight::materials::lobes::{CustomLobe, Lambert, LobeClass, LobeModel, LobeSample};
 use dualight::materials::{Bsdf, Material, MaterialDesc, MaterialEntry, MaterialTraits};
@@ -63,7 +63,7 @@ struct Velvet {
 }
 
 impl Material for Velvet {
-    fn scatter(&self, _sp: &SurfacePoint, bsdf: &mut Bsdf) {
+    fn scatter(&self, _at: &Surface<'_>, bsdf: &mut Bsdf) {
         bsdf.push(self.rim.clone());
         bsdf.push(self.cloth);
     }

@@ -62,3 +62,4 @@ pub mod report;
 pub mod sampling;
 pub mod scene;
 pub mod stats;
+pub mod textures;

@@ -12,6 +12,7 @@ use std::f64::consts::TAU;
 use common::points::{Specimen, direction, point, point_with_normal, specimens};
 use common::stats::Samples;
 use dualight::color::Rgb;
+use dualight::geometry::Surface;
 use dualight::materials::{LobeClass, MaterialDesc, TransportMode, fresnel};
 use dualight::math::DVec3;
 use dualight::sampling::{Rng, warp};
@@ -106,7 +107,7 @@ fn shading_normals_keep_the_two_transports_adjoint() {
             }
             let value = |from: DVec3, to, mode| {
                 let sp = point_with_normal(from, n);
-                let v = s.material.bsdf(&sp, mode).eval(to, |_| 1.0);
+                let v = s.material.bsdf(&Surface::bare(&sp), mode).eval(to, |_| 1.0);
                 v.diffuse + v.glossy
             };
             let photon = value(wo, wi, TransportMode::Importance) / wi.z.abs();
@@ -362,9 +363,10 @@ fn values_are_finite_wherever_one_looks() {
     // Extremes of the random numbers.
     for (s, cosines) in views(&ROUGHNESSES) {
         for cos in cosines {
-            let bsdf = s
-                .material
-                .bsdf(&point(direction(cos, TAU / 3.0)), TransportMode::Radiance);
+            let bsdf = s.material.bsdf(
+                &Surface::bare(&point(direction(cos, TAU / 3.0))),
+                TransportMode::Radiance,
+            );
             for a in [0.0, 0.5, 1.0 - f64::EPSILON] {
                 for b in [0.0, 0.5, 1.0 - f64::EPSILON] {
                     for c in [0.0, 0.5, 1.0 - f64::EPSILON] {

@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 
 use common::{glass, lambert, mirror};
 use dualight::color::Rgb;
-use dualight::geometry::{MaterialId, ObjectId, SurfacePoint};
+use dualight::geometry::{MaterialId, ObjectId, Surface, SurfacePoint};
 use dualight::lights::{LIGHTS, Light, LightDesc};
 use dualight::materials::{Bsdf, MATERIALS, Material, MaterialDesc, TransportMode};
 use dualight::math::{BoundingSphere, DVec3};
@@ -86,7 +86,7 @@ fn point(wo: DVec3, front: bool) -> SurfacePoint {
         wo,
         front,
         distance: 1.0,
-        uv: [0.0; 2],
+        barycentrics: [0.0; 2],
         offset: 0.0,
         prim: 0,
         object: ObjectId(0),
@@ -101,7 +101,7 @@ fn build(desc: &MaterialDesc) -> Box<dyn Material> {
 }
 
 fn bsdf(m: &dyn Material, wo: DVec3, front: bool, mode: TransportMode) -> Bsdf {
-    m.bsdf(&point(wo, front), mode)
+    m.bsdf(&Surface::bare(&point(wo, front)), mode)
 }
 
 fn descs() -> Vec<(String, MaterialDesc)> {

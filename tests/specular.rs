@@ -223,9 +223,7 @@ fn a_glass_sphere_divides_parallel_light() {
                     let (mut events, mut weight) = (0, 1.0);
                     while let Some(hit) = accel.intersect(&ray) {
                         let sp = ball.surface_point(&ray, &hit);
-                        let bsdf = ball
-                            .material(sp.material)
-                            .bsdf(&sp, TransportMode::Importance);
+                        let bsdf = ball.bsdf(&sp, None, TransportMode::Importance);
                         let s = bsdf.sample(rng.next_1d(), rng.next_2d()).expect("glass");
                         weight *= s.weight.r;
                         events += 1;

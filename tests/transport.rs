@@ -15,7 +15,7 @@ use dualight::control::Control;
 use dualight::film::{Component, Image};
 use dualight::geometry::Ray;
 use dualight::lights::LightDesc;
-use dualight::materials::{Bsdf, TransportMode};
+use dualight::materials::TransportMode;
 use dualight::math::DVec3;
 use dualight::photons::{PhotonClass, PhotonMaps, PhotonSettings, trace_photons};
 use dualight::pipeline::{RenderSettings, render};
@@ -205,8 +205,7 @@ fn leaving(scene: &Scene, ray: Ray, mut out: impl FnMut(DVec3, u32, f64)) {
             continue;
         };
         let sp = scene.surface_point(&ray, &hit);
-        let mut bsdf = Bsdf::new(&sp, TransportMode::Importance);
-        scene.material(sp.material).scatter(&sp, &mut bsdf);
+        let bsdf = scene.bsdf(&sp, None, TransportMode::Importance);
         for b in bsdf.branches().unwrap() {
             stack.push((sp.spawn(b.wi), weight * b.weight.r, depth + 1));
         }

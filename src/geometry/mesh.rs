@@ -32,8 +32,12 @@ pub struct TriangleMesh {
     pub indices: Vec<[u32; 3]>,
     /// Shading normals per vertex; empty for flat shading.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates per vertex; may be empty.
-    pub uvs: Vec<[f32; 2]>,
+    /// Sets of texture coordinates per vertex; a set may be empty.
+    pub uv_sets: Vec<Vec<[f32; 2]>>,
+    /// Linear colour and alpha per vertex; may be empty.
+    pub colors: Vec<[f32; 4]>,
+    /// Tangents per vertex along growing `u`, with the sign of the bitangent; may be empty.
+    pub tangents: Vec<[f32; 4]>,
 }
 
 impl TriangleMesh {
@@ -79,17 +83,31 @@ impl TriangleMesh {
         Some(a * (1.0 - b1 - b2) + b * b1 + c * b2)
     }
 
-    /// Interpolated texture coordinates; zero if the mesh has none.
+    /// Texture coordinates of a triangle's corners in one set; zero if the mesh has none.
     #[inline]
-    pub fn uv(&self, prim: u32, b1: f64, b2: f64) -> [f64; 2] {
-        if self.uvs.is_empty() {
-            return [0.0; 2];
+    pub fn corner_uvs(&self, set: usize, prim: u32) -> [[f64; 2]; 3] {
+        let uvs = self.uv_sets.get(set).filter(|uvs| !uvs.is_empty());
+        match uvs {
+            None => [[0.0; 2]; 3],
+            Some(uvs) => self.indices[prim as usize].map(|i| uvs[i as usize].map(f64::from)),
         }
-        let [a, b, c] = self.indices[prim as usize].map(|i| self.uvs[i as usize]);
-        let mix = |k: usize| {
+    }
+
+    /// A vertex attribute interpolated over a triangle; `None` if the mesh lacks it.
+    #[inline]
+    pub fn interpolate<const N: usize>(
+        &self,
+        attribute: &[[f32; N]],
+        prim: u32,
+        [b1, b2]: [f64; 2],
+    ) -> Option<[f64; N]> {
+        if attribute.is_empty() {
+            return None;
+        }
+        let [a, b, c] = self.indices[prim as usize].map(|i| attribute[i as usize]);
+        Some(std::array::from_fn(|k| {
             f64::from(a[k]) * (1.0 - b1 - b2) + f64::from(b[k]) * b1 + f64::from(c[k]) * b2
-        };
-        [mix(0), mix(1)]
+        }))
     }
 
     /// Box around the vertices that triangles use.

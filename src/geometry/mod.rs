@@ -9,6 +9,7 @@ mod mesh;
 mod object;
 mod ray;
 pub mod sphere;
+mod surface;
 mod surface_point;
 pub mod triangle;
 
@@ -16,4 +17,5 @@ pub use hit::Hit;
 pub use mesh::{Invalid, TriangleMesh};
 pub use object::{Geometry, Object, Placement, Shape, SphereSet};
 pub use ray::Ray;
+pub use surface::{Footprint, Surface};
 pub use surface_point::{LightId, MaterialId, ObjectId, ShapeId, SurfacePoint};

@@ -45,8 +45,8 @@ pub struct SurfacePoint {
     pub front: bool,
     /// Distance from the ray's origin in metres.
     pub distance: f64,
-    /// Texture coordinates.
-    pub uv: [f64; 2],
+    /// Barycentric weights of a triangle's second and third corner; zero on a sphere.
+    pub barycentrics: [f64; 2],
     /// How far from the surface spawned rays start, in metres.
     pub offset: f64,
     /// Triangle or sphere within the shape.
@@ -90,7 +90,7 @@ impl SurfacePoint {
             wo,
             front: wo.dot(on.ng) > 0.0,
             distance: on.t * length,
-            uv: on.uv,
+            barycentrics: on.barycentrics,
             offset: robust::spawn_offset(on.p, on.reach),
             prim: hit.prim,
             object: hit.object,
@@ -144,7 +144,7 @@ struct Refined {
     p: DVec3,
     ng: DVec3,
     n: DVec3,
-    uv: [f64; 2],
+    barycentrics: [f64; 2],
     /// Bound on the coordinates that a backend computes with, in world units.
     reach: f64,
 }
@@ -185,7 +185,7 @@ fn refine_local(
                 p: v[0] + e1 * b1 + e2 * b2,
                 ng,
                 n,
-                uv: mesh.uv(prim, b1, b2),
+                barycentrics: [b1, b2],
                 reach: reach(far, place),
             }
         }
@@ -209,7 +209,7 @@ fn refine_local(
                 p: c + n * r,
                 ng: n,
                 n,
-                uv: [0.0; 2],
+                barycentrics: [0.0; 2],
                 reach: reach(max_abs(c) + r, place),
             }
         }

@@ -45,10 +45,11 @@ pub(super) fn read<'a>(
             Some(a) => narrow(same_length(&a, source.read::<3>(&a)?, n)?),
             None => Vec::new(),
         },
-        uvs: match attributes.get("TEXCOORD_0") {
-            Some(a) => narrow(same_length(&a, source.read::<2>(&a)?, n)?),
+        uv_sets: match attributes.get("TEXCOORD_0") {
+            Some(a) => vec![narrow(same_length(&a, source.read::<2>(&a)?, n)?)],
             None => Vec::new(),
         },
+        ..Default::default()
     };
     if let Some(i) = order.iter().find(|&&i| i as usize >= n) {
         return Err(p.problem(format!("index {i} is out of range: there are {n} vertices")));

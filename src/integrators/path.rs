@@ -8,7 +8,7 @@ use super::{Integrator, IntegratorEntry, RenderContext, Scratch};
 use crate::color::Rgb;
 use crate::film::{Component, PixelSample};
 use crate::geometry::Ray;
-use crate::materials::{Bsdf, LobeClass, TransportMode};
+use crate::materials::{LobeClass, TransportMode};
 use crate::sampling::Sampler;
 
 /// Scattering events after which roulette begins.
@@ -87,7 +87,6 @@ impl Integrator for Path<'_> {
                 break;
             };
             let sp = cx.scene.surface_point(&ray, &hit);
-            let material = cx.scene.material(sp.material);
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
@@ -106,8 +105,7 @@ impl Integrator for Path<'_> {
                     out.add(walk.component(), beta * le * weight);
                 }
             }
-            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
-            material.scatter(&sp, &mut bsdf);
+            let bsdf = cx.scene.bsdf(&sp, None, TransportMode::Radiance);
             if depth == 0 {
                 out.albedo += bsdf.albedo();
             }

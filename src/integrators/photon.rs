@@ -131,12 +131,10 @@ impl PhotonMapping<'_> {
                 return;
             };
             let sp = cx.scene.surface_point(&ray, &hit);
-            let material = cx.scene.material(sp.material);
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
-            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
-            material.scatter(&sp, &mut bsdf);
+            let bsdf = cx.scene.bsdf(&sp, None, TransportMode::Radiance);
             if depth == 0 {
                 out.alpha += 1.0;
                 out.albedo += bsdf.albedo();
@@ -372,10 +370,7 @@ impl PhotonMapping<'_> {
             if depth == 0 && sp.light.is_some() {
                 on_light(&sp, beta);
             }
-            let bsdf = cx
-                .scene
-                .material(sp.material)
-                .bsdf(&sp, TransportMode::Radiance);
+            let bsdf = cx.scene.bsdf(&sp, None, TransportMode::Radiance);
             let diffuse = bsdf.has_diffuse();
             if diffuse && !bsdf.has_specular() {
                 return Some(Gathered { sp, bsdf, beta });

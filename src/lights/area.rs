@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
+use crate::geometry::{Surface, SurfacePoint};
 use crate::math::{DVec3, Frame, max_abs, robust};
 use crate::sampling::{Discrete, warp};
 
@@ -77,8 +77,8 @@ impl Light for AreaLight {
     }
 
     #[inline]
-    fn radiance(&self, on: &SurfacePoint) -> Rgb {
-        if on.front || self.double_sided {
+    fn radiance(&self, on: &Surface<'_>) -> Rgb {
+        if on.sp.front || self.double_sided {
             self.radiance
         } else {
             Rgb::ZERO

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::point::point_origin;
 use super::{Distant, EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
+use crate::geometry::{Surface, SurfacePoint};
 use crate::math::{BoundingSphere, DVec3, Frame};
 use crate::sampling::warp;
 
@@ -34,7 +34,7 @@ impl Light for DirectionalLight {
         0.0
     }
 
-    fn radiance(&self, _on: &SurfacePoint) -> Rgb {
+    fn radiance(&self, _on: &Surface<'_>) -> Rgb {
         Rgb::ZERO
     }
 

@@ -14,7 +14,7 @@ mod spot;
 pub use desc::LightDesc;
 
 use crate::color::Rgb;
-use crate::geometry::{Ray, SurfacePoint};
+use crate::geometry::{Ray, Surface, SurfacePoint};
 use crate::math::DVec3;
 
 /// A sample of the light that arrives at a point.
@@ -77,8 +77,8 @@ pub trait Light: Send + Sync {
     /// the point `on` of this light; 0 for delta lights.
     fn pdf_li(&self, p: DVec3, on: &SurfacePoint) -> f64;
 
-    /// Radiance emitted at a point of this light toward `on.wo`.
-    fn radiance(&self, on: &SurfacePoint) -> Rgb;
+    /// Radiance emitted at a point of this light toward `on.sp.wo`.
+    fn radiance(&self, on: &Surface<'_>) -> Rgb;
 
     /// Parallel light, if that is what it is: photons then leave a disc beside the scene, all in
     /// one direction.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::{EmissionOrigin, LiSample, Light, LightEntry};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
+use crate::geometry::{Surface, SurfacePoint};
 use crate::math::DVec3;
 use crate::sampling::warp;
 
@@ -52,7 +52,7 @@ impl Light for PointLight {
         0.0
     }
 
-    fn radiance(&self, _on: &SurfacePoint) -> Rgb {
+    fn radiance(&self, _on: &Surface<'_>) -> Rgb {
         Rgb::ZERO
     }
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
+use crate::geometry::{Surface, SurfacePoint};
 use crate::math::{BoundingSphere, DVec3, Frame, max_abs, robust};
 use crate::sampling::{Discrete, warp};
 
@@ -91,8 +91,12 @@ impl Light for SphereLight {
         Self::pdf_on(s, p, on.p, on.wo.dot(on.ng)) * self.choose.probability(i)
     }
 
-    fn radiance(&self, on: &SurfacePoint) -> Rgb {
-        if on.front { self.radiance } else { Rgb::ZERO }
+    fn radiance(&self, on: &Surface<'_>) -> Rgb {
+        if on.sp.front {
+            self.radiance
+        } else {
+            Rgb::ZERO
+        }
     }
 
     fn sample_origin(&self, u: [f64; 2]) -> Option<EmissionOrigin> {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::point::{point_origin, sample_point};
 use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
+use crate::geometry::{Surface, SurfacePoint};
 use crate::math::{DVec3, Frame};
 use crate::sampling::warp;
 
@@ -57,7 +57,7 @@ impl Light for SpotLight {
         0.0
     }
 
-    fn radiance(&self, _on: &SurfacePoint) -> Rgb {
+    fn radiance(&self, _on: &Surface<'_>) -> Rgb {
         Rgb::ZERO
     }
 

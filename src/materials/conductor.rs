@@ -3,7 +3,7 @@
 use super::fresnel::Schlick;
 use super::lobes::GgxReflection;
 use super::{Bsdf, Material, MaterialDesc, MaterialEntry, MaterialTraits};
-use crate::geometry::SurfacePoint;
+use crate::geometry::Surface;
 
 struct Conductor {
     lobe: GgxReflection,
@@ -11,7 +11,7 @@ struct Conductor {
 
 impl Material for Conductor {
     #[inline]
-    fn scatter(&self, _sp: &SurfacePoint, bsdf: &mut Bsdf) {
+    fn scatter(&self, _at: &Surface<'_>, bsdf: &mut Bsdf) {
         bsdf.push(self.lobe);
     }
 

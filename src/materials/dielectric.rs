@@ -4,7 +4,7 @@
 use super::lobes::{GgxDielectric, Lobe, SmoothDielectric, ThinDielectric};
 use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
+use crate::geometry::Surface;
 
 /// The transmitting part of a dielectric; shared with the general glTF material.
 #[derive(Clone, Copy)]
@@ -72,8 +72,8 @@ struct DielectricMaterial {
 
 impl Material for DielectricMaterial {
     #[inline]
-    fn scatter(&self, sp: &SurfacePoint, bsdf: &mut Bsdf) {
-        bsdf.push(self.interface.lobe(sp.front));
+    fn scatter(&self, at: &Surface<'_>, bsdf: &mut Bsdf) {
+        bsdf.push(self.interface.lobe(at.sp.front));
     }
 
     fn traits(&self) -> MaterialTraits {

@@ -4,7 +4,7 @@
 use super::lobes::Lambert;
 use super::{Bsdf, Material, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
+use crate::geometry::Surface;
 
 struct LambertMaterial {
     albedo: Rgb,
@@ -12,7 +12,7 @@ struct LambertMaterial {
 
 impl Material for LambertMaterial {
     #[inline]
-    fn scatter(&self, _sp: &SurfacePoint, bsdf: &mut Bsdf) {
+    fn scatter(&self, _at: &Surface<'_>, bsdf: &mut Bsdf) {
         bsdf.push(Lambert {
             albedo: self.albedo,
         });

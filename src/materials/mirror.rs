@@ -3,7 +3,7 @@
 use super::fresnel::Schlick;
 use super::lobes::SmoothReflection;
 use super::{Bsdf, Material, MaterialDesc, MaterialEntry, MaterialTraits};
-use crate::geometry::SurfacePoint;
+use crate::geometry::Surface;
 
 struct Mirror {
     fresnel: Schlick,
@@ -11,7 +11,7 @@ struct Mirror {
 
 impl Material for Mirror {
     #[inline]
-    fn scatter(&self, _sp: &SurfacePoint, bsdf: &mut Bsdf) {
+    fn scatter(&self, _at: &Surface<'_>, bsdf: &mut Bsdf) {
         bsdf.push(SmoothReflection {
             fresnel: self.fresnel,
         });

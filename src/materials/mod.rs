@@ -23,17 +23,17 @@ pub use bsdf::{Bsdf, BsdfSample, BsdfValue, TransportMode};
 pub use desc::{Interior, MaterialDesc, MaterialTraits};
 pub use lobes::{CustomLobe, Lobe, LobeClass, LobeModel, LobeSample};
 
-use crate::geometry::SurfacePoint;
+use crate::geometry::Surface;
 
 /// What a surface is made of.
 pub trait Material: Send + Sync {
-    /// Pushes the lobes at a point, seen from `sp.wo`.
-    fn scatter(&self, sp: &SurfacePoint, bsdf: &mut Bsdf);
+    /// Pushes the lobes at a point, seen from `at.sp.wo`.
+    fn scatter(&self, at: &Surface<'_>, bsdf: &mut Bsdf);
 
-    /// The scattering function at a point, seen from `sp.wo`.
-    fn bsdf(&self, sp: &SurfacePoint, mode: TransportMode) -> Bsdf {
-        let mut bsdf = Bsdf::new(sp, mode);
-        self.scatter(sp, &mut bsdf);
+    /// The scattering function at a point, seen from `at.sp.wo`.
+    fn bsdf(&self, at: &Surface<'_>, mode: TransportMode) -> Bsdf {
+        let mut bsdf = Bsdf::new(at.sp, mode);
+        self.scatter(at, &mut bsdf);
         bsdf
     }
 

@@ -6,7 +6,7 @@ use super::fresnel::Schlick;
 use super::lobes::{CoatedLambert, GgxReflection, Lobe, SmoothReflection};
 use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
+use crate::geometry::Surface;
 
 struct Pbr {
     diffuse: Rgb,
@@ -21,7 +21,7 @@ struct Pbr {
 
 impl Material for Pbr {
     #[inline]
-    fn scatter(&self, sp: &SurfacePoint, bsdf: &mut Bsdf) {
+    fn scatter(&self, at: &Surface<'_>, bsdf: &mut Bsdf) {
         bsdf.push(CoatedLambert {
             albedo: self.diffuse,
             layer: self.layer,
@@ -36,7 +36,7 @@ impl Material for Pbr {
         };
         bsdf.push(lobe);
         if let Some(interface) = &self.interface {
-            bsdf.push(interface.lobe(sp.front));
+            bsdf.push(interface.lobe(at.sp.front));
         }
     }
 

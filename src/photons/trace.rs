@@ -8,7 +8,7 @@ use super::photon::{Photon, PhotonClass};
 use super::{EmittedPhoton, PhotonSettings};
 use crate::accel::Accelerator;
 use crate::control::Control;
-use crate::materials::{Bsdf, LobeClass, TransportMode};
+use crate::materials::{LobeClass, TransportMode};
 use crate::sampling::{Rng, hash2, stream};
 use crate::scene::Scene;
 use crate::stats::{PhotonCounts, RayCounts};
@@ -126,8 +126,7 @@ impl Tracer<'_> {
                 out.ledger.absorbed += power - left;
                 power = left;
             }
-            let mut bsdf = Bsdf::new(&sp, TransportMode::Importance);
-            self.scene.material(sp.material).scatter(&sp, &mut bsdf);
+            let mut bsdf = self.scene.bsdf(&sp, None, TransportMode::Importance);
             if bsdf.has_diffuse() {
                 let ng = if sp.front { sp.ng } else { -sp.ng };
                 let photon = Photon::new(sp.p, sp.wo, ng, power, class);

@@ -416,7 +416,17 @@ fn bake_mesh(mesh: &TriangleMesh, world: &DAffine3) -> TriangleMesh {
                     .into()
             })
             .collect(),
-        uvs: mesh.uvs.clone(),
+        uv_sets: mesh.uv_sets.clone(),
+        colors: mesh.colors.clone(),
+        tangents: mesh
+            .tangents
+            .iter()
+            .map(|&[x, y, z, w]| {
+                let t = world.transform_vector3(Vec3::new(x, y, z).as_dvec3());
+                let t = t.normalize_or_zero().as_vec3();
+                [t.x, t.y, t.z, if flip { -w } else { w }]
+            })
+            .collect(),
     }
 }
 

@@ -10,9 +10,9 @@ use std::sync::Arc;
 
 use crate::cameras::CameraDesc;
 use crate::color::Rgb;
-use crate::geometry::{Geometry, LightId, MaterialId, Ray, SurfacePoint};
+use crate::geometry::{Footprint, Geometry, LightId, MaterialId, Ray, Surface, SurfacePoint};
 use crate::lights::Light;
-use crate::materials::Material;
+use crate::materials::{Bsdf, Material, TransportMode};
 use crate::math::{Aabb, DVec3};
 use crate::sampling::Discrete;
 
@@ -58,10 +58,36 @@ impl Scene {
         self.lights.iter().map(|l| l.power()).sum()
     }
 
+    /// A surface point with access to its primitive.
+    #[inline]
+    pub fn surface<'a>(
+        &'a self,
+        sp: &'a SurfacePoint,
+        footprint: Option<Footprint>,
+    ) -> Surface<'a> {
+        Surface::new(&self.geometry, sp, footprint)
+    }
+
+    /// The scattering function at a surface point.
+    #[inline]
+    pub fn bsdf(
+        &self,
+        sp: &SurfacePoint,
+        footprint: Option<Footprint>,
+        mode: TransportMode,
+    ) -> Bsdf {
+        let mut bsdf = Bsdf::new(sp, mode);
+        self.material(sp.material)
+            .scatter(&self.surface(sp, footprint), &mut bsdf);
+        bsdf
+    }
+
     /// Radiance emitted at a surface point toward where the ray came from.
     #[inline]
     pub fn emitted(&self, sp: &SurfacePoint) -> Rgb {
-        sp.light.map_or(Rgb::ZERO, |id| self.light(id).radiance(sp))
+        sp.light.map_or(Rgb::ZERO, |id| {
+            self.light(id).radiance(&self.surface(sp, None))
+        })
     }
 
     /// The density in solid angle with which light sampling at `from` finds the emitter at `on`.

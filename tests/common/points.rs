@@ -1,7 +1,7 @@
 //! Surface points and materials for tests of scattering, without a scene.
 
 use dualight::color::Rgb;
-use dualight::geometry::{MaterialId, ObjectId, SurfacePoint};
+use dualight::geometry::{MaterialId, ObjectId, Surface, SurfacePoint};
 use dualight::materials::{Bsdf, MATERIALS, Material, MaterialDesc, TransportMode};
 use dualight::math::DVec3;
 
@@ -14,7 +14,7 @@ pub fn point_with_normal(wo: DVec3, n: DVec3) -> SurfacePoint {
         wo,
         front: wo.z > 0.0,
         distance: 1.0,
-        uv: [0.0; 2],
+        barycentrics: [0.0; 2],
         offset: 0.0,
         prim: 0,
         object: ObjectId(0),
@@ -46,7 +46,7 @@ pub struct Specimen {
 impl Specimen {
     /// The scattering function seen along `wo`.
     pub fn bsdf(&self, wo: DVec3, mode: TransportMode) -> Bsdf {
-        self.material.bsdf(&point(wo), mode)
+        self.material.bsdf(&Surface::bare(&point(wo)), mode)
     }
 }
 

@@ -1,0 +1,10 @@
+//! Textures: images over a surface. They answer what colour a surface point has, and never
+//! read files.
+
+mod image;
+mod sampler;
+mod texture;
+
+pub use image::Image;
+pub use sampler::{Filter, Sampler, Wrap};
+pub use texture::{Texture, UvTransform};

@@ -1,0 +1,51 @@
+//! How an image is continued beyond its border and between its texels (glTF 2.0, 3.8.4).
+
+/// What lies beyond the border.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The image again.
+    #[default]
+    Repeat,
+    /// The image mirrored.
+    Mirror,
+    /// The border's texels.
+    Clamp,
+}
+
+impl Wrap {
+    /// The texel that stands for texel `i` of `n`.
+    #[inline]
+    pub fn index(self, i: i64, n: u32) -> u32 {
+        let n = i64::from(n);
+        let i = match self {
+            Self::Repeat => i.rem_euclid(n),
+            Self::Clamp => i.clamp(0, n - 1),
+            Self::Mirror => {
+                let k = i.rem_euclid(2 * n);
+                if k < n { k } else { 2 * n - 1 - k }
+            }
+        };
+        i as u32
+    }
+}
+
+/// What lies between texels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Filter {
+    /// The nearest texel.
+    Nearest,
+    /// A linear blend.
+    #[default]
+    Linear,
+}
+
+/// How an image is looked up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sampler {
+    /// Beyond the left and right border.
+    pub wrap_u: Wrap,
+    /// Beyond the upper and lower border.
+    pub wrap_v: Wrap,
+    /// Between texels.
+    pub filter: Filter,
+}
