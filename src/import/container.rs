@@ -89,7 +89,8 @@ fn read_buffer(
     Ok(data)
 }
 
-fn read_uri(uri: &Cursor<'_>, file: &Path) -> Result<Vec<u8>, Problem> {
+/// The bytes that a URI holds or names, in a file beside `file`.
+pub(super) fn read_uri(uri: &Cursor<'_>, file: &Path) -> Result<Vec<u8>, Problem> {
     let text = uri.str()?;
     if let Some(data) = text.strip_prefix("data:") {
         let (head, body) = data

@@ -1,5 +1,6 @@
 //! Materials: PBR factors and the extensions that Dualight knows.
 
+use super::image::Images;
 use super::json::Cursor;
 use super::{Notes, Problem};
 use crate::color::Rgb;
@@ -10,7 +11,11 @@ fn rgb(c: [f64; 3]) -> Rgb {
 }
 
 /// Translates one material.
-pub(super) fn read(m: &Cursor<'_>, notes: &mut Notes) -> Result<MaterialDesc, Problem> {
+pub(super) fn read<'a>(
+    m: &Cursor<'a>,
+    _images: &mut Images<'a>,
+    notes: &mut Notes,
+) -> Result<MaterialDesc, Problem> {
     let mut out = MaterialDesc {
         name: m.name(),
         emission: rgb(m.numbers_or("emissiveFactor", [0.0; 3])?),

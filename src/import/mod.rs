@@ -6,10 +6,17 @@
 
 mod accessor;
 mod container;
+mod image;
 mod json;
 mod material;
 mod mesh;
 mod node;
+#[cfg_attr(
+    not(test),
+    expect(dead_code, reason = "materials take their textures next")
+)]
+mod texture;
+mod used;
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -19,6 +26,7 @@ use crate::error::{Error, Result};
 use crate::materials::MaterialDesc;
 use crate::scene::{Scene, SceneBuilder, ScenePlugins};
 use accessor::Source;
+use image::Images;
 use json::Cursor;
 use node::Walker;
 
@@ -40,6 +48,8 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_transmission",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "EXT_texture_webp",
 ];
 
 /// Something is wrong at a place in the file.
@@ -140,7 +150,16 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
         root: root.clone(),
         buffers: &document.buffers,
     };
-    fill(&root, &source, options, &mut builder, &mut notes).map_err(|e| match e {
+    let mut images = Images::new(&source, path);
+    fill(
+        &root,
+        &source,
+        &mut images,
+        options,
+        &mut builder,
+        &mut notes,
+    )
+    .map_err(|e| match e {
         Failure::Problem(p) => p.into_error(path),
         Failure::Plugin(place, e) => match *e {
             Error::Usage(problem) => Problem::invalid(&place, problem).into_error(path),
@@ -189,6 +208,7 @@ impl From<Problem> for Failure {
 fn fill<'a>(
     root: &Cursor<'a>,
     source: &Source<'a>,
+    images: &mut Images<'a>,
     options: &ImportOptions,
     builder: &mut SceneBuilder,
     notes: &mut Notes,
@@ -196,9 +216,16 @@ fn fill<'a>(
     if root.get("animations").is_some() {
         notes.add("animations are not supported yet: the rest pose is used", 1);
     }
+    let roots = roots(root, options)?;
+    let used = used::materials(root, &roots)?;
+    let entries = root.items("materials")?;
+    for (_, m) in entries.iter().enumerate().filter(|(i, _)| used.contains(i)) {
+        material::read(m, images, &mut Notes::default())?;
+    }
+    images.decode()?;
     let mut materials = Vec::new();
-    for m in root.items("materials")? {
-        let desc = material::read(&m, notes)?;
+    for m in entries {
+        let desc = material::read(&m, images, notes)?;
         let id = builder
             .add_material(&desc)
             .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
@@ -207,7 +234,6 @@ fn fill<'a>(
     let default_material = builder
         .add_material(&MaterialDesc::default())
         .map_err(|e| Failure::Plugin("the default material".into(), Box::new(e)))?;
-    let roots = roots(root, options)?;
     let mut walker = Walker {
         source,
         options,

@@ -1,61 +1,253 @@
-//! A decoded image.
+//! A decoded image: the numbers of its file, and what they mean.
 
-/// An image of linear colour with alpha, rows from the top.
+use std::sync::{LazyLock, OnceLock};
+
+use crate::color::srgb_to_linear;
+
+/// What the numbers of an image mean. The image itself does not know: one image can serve as
+/// colour in one place and as data in another, and is kept once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Content {
+    /// sRGB colour; alpha, if there is any, is a number of its own.
+    Color,
+    /// sRGB colour, and alpha that says how much of it is there: where images are averaged,
+    /// colour counts by its alpha.
+    Coverage,
+    /// Linear numbers.
+    #[default]
+    Data,
+    /// Tangent-space normals, `2·t − 1`.
+    Normal,
+}
+
+impl Content {
+    /// Whether colour is stored by the sRGB curve.
+    #[inline]
+    pub fn is_srgb(self) -> bool {
+        matches!(self, Self::Color | Self::Coverage)
+    }
+}
+
+/// The numbers of an image as its file gives them, channels interleaved. Whole numbers stand for
+/// 0 to 1 and are kept as they are (an image of 8 bits takes one byte per number, not sixteen);
+/// a table decodes them at every lookup.
 #[derive(Clone, Debug, PartialEq)]
+pub enum Texels {
+    /// 8 bits.
+    U8(Vec<u8>),
+    /// 16 bits.
+    U16(Vec<u16>),
+    /// Floating point; always linear.
+    F32(Vec<f32>),
+}
+
+impl Texels {
+    fn len(&self) -> usize {
+        match self {
+            Self::U8(v) => v.len(),
+            Self::U16(v) => v.len(),
+            Self::F32(v) => v.len(),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Self::U8(v) => v.len(),
+            Self::U16(v) => 2 * v.len(),
+            Self::F32(v) => 4 * v.len(),
+        }
+    }
+}
+
+/// A decoded image, rows from the top.
+#[derive(Debug)]
 pub struct Image {
     width: u32,
     height: u32,
-    /// Four channels per texel.
-    texels: Vec<[f32; 4]>,
+    /// Grey, grey and alpha, RGB or RGBA.
+    channels: usize,
+    texels: Texels,
+    /// Smallest and largest number of each channel as stored.
+    extremes: OnceLock<[[f64; 4]; 2]>,
 }
 
 impl Image {
-    /// An image of `width × height` texels; `None` if their number does not fit or is zero.
+    /// A linear image of `width × height` texels; `None` if their number does not fit or is
+    /// zero.
     pub fn new(width: u32, height: u32, texels: Vec<[f32; 4]>) -> Option<Self> {
-        let n = (width as usize).checked_mul(height as usize)?;
-        (n > 0 && n == texels.len()).then_some(Self {
+        Self::from_texels(width, height, 4, Texels::F32(texels.into_flattened()))
+    }
+
+    /// An image of `width × height` texels of 1 to 4 `channels` (grey, grey and alpha, RGB,
+    /// RGBA); `None` if their number does not fit or is zero.
+    pub fn from_texels(width: u32, height: u32, channels: usize, texels: Texels) -> Option<Self> {
+        let n = (width as usize)
+            .checked_mul(height as usize)?
+            .checked_mul(channels)?;
+        let fits = n > 0 && n == texels.len() && (1..=4).contains(&channels);
+        fits.then_some(Self {
             width,
             height,
+            channels,
             texels,
+            extremes: OnceLock::new(),
         })
     }
 
+    /// An image of one texel: white.
+    pub fn white() -> Self {
+        Self {
+            width: 1,
+            height: 1,
+            channels: 1,
+            texels: Texels::U8(vec![255]),
+            extremes: OnceLock::new(),
+        }
+    }
+
     /// Width in texels.
+    #[inline]
     pub fn width(&self) -> u32 {
         self.width
     }
 
     /// Height in texels.
+    #[inline]
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// The texel in column `x` of row `y`, both within the image.
+    /// Numbers per texel in the file: 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Bits per number.
+    pub fn depth(&self) -> u32 {
+        match self.texels {
+            Texels::U8(_) => 8,
+            Texels::U16(_) => 16,
+            Texels::F32(_) => 32,
+        }
+    }
+
+    /// Memory of the texels in bytes.
+    pub fn bytes(&self) -> usize {
+        self.texels.bytes()
+    }
+
+    /// The texel in column `x` of row `y`, both within the image: linear red, green, blue and
+    /// alpha.
     #[inline]
-    pub fn texel(&self, x: u32, y: u32) -> [f64; 4] {
-        self.texels[y as usize * self.width as usize + x as usize].map(f64::from)
+    pub fn texel(&self, x: u32, y: u32, content: Content) -> [f64; 4] {
+        self.at(
+            y as usize * self.width as usize + x as usize,
+            content.is_srgb(),
+        )
     }
 
-    /// Mean over all texels.
-    pub fn mean(&self) -> [f64; 4] {
+    /// The texel of index `i`.
+    #[inline]
+    pub(super) fn at(&self, i: usize, srgb: bool) -> [f64; 4] {
+        let i = i * self.channels;
+        match &self.texels {
+            Texels::U8(v) => {
+                let [color, alpha] = if srgb {
+                    [&SRGB_8, &LINEAR_8]
+                } else {
+                    [&LINEAR_8; 2]
+                };
+                let (color, alpha) = (LazyLock::force(color), LazyLock::force(alpha));
+                self.expand(
+                    i,
+                    |i| f64::from(color[usize::from(v[i])]),
+                    |i| f64::from(alpha[usize::from(v[i])]),
+                )
+            }
+            Texels::U16(v) if srgb => {
+                let table = LazyLock::force(&SRGB_16);
+                self.expand(
+                    i,
+                    |i| f64::from(table[usize::from(v[i])]),
+                    |i| f64::from(v[i]) / 65535.0,
+                )
+            }
+            Texels::U16(v) => {
+                let f = |i: usize| f64::from(v[i]) / 65535.0;
+                self.expand(i, f, f)
+            }
+            Texels::F32(v) => {
+                let f = |i: usize| f64::from(v[i]);
+                self.expand(i, f, f)
+            }
+        }
+    }
+
+    /// The four numbers of the texel that begins at `i`: grey is all colours, and what has no
+    /// alpha is whole.
+    #[inline]
+    fn expand(
+        &self,
+        i: usize,
+        color: impl Fn(usize) -> f64,
+        alpha: impl Fn(usize) -> f64,
+    ) -> [f64; 4] {
+        match self.channels {
+            1 => {
+                let g = color(i);
+                [g, g, g, 1.0]
+            }
+            2 => {
+                let g = color(i);
+                [g, g, g, alpha(i + 1)]
+            }
+            3 => [color(i), color(i + 1), color(i + 2), 1.0],
+            _ => [color(i), color(i + 1), color(i + 2), alpha(i + 3)],
+        }
+    }
+
+    /// Mean over all texels, linear.
+    pub fn mean(&self, content: Content) -> [f64; 4] {
+        let n = self.texels.len() / self.channels;
         let mut sum = [0.0; 4];
-        for t in &self.texels {
-            for (s, x) in sum.iter_mut().zip(t) {
-                *s += f64::from(*x);
+        for i in 0..n {
+            for (s, x) in sum.iter_mut().zip(self.at(i, content.is_srgb())) {
+                *s += x;
             }
         }
-        sum.map(|s| s / self.texels.len() as f64)
+        sum.map(|s| s / n as f64)
     }
 
-    /// Smallest and largest value of each channel.
-    pub fn range(&self) -> [[f64; 4]; 2] {
-        let mut range = [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
-        for t in &self.texels {
-            for k in 0..4 {
-                range[0][k] = range[0][k].min(f64::from(t[k]));
-                range[1][k] = range[1][k].max(f64::from(t[k]));
+    /// Smallest and largest value of each channel, linear.
+    pub fn range(&self, content: Content) -> [[f64; 4]; 2] {
+        let extremes = self.extremes.get_or_init(|| {
+            let mut range = [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
+            for i in 0..self.texels.len() / self.channels {
+                for (k, x) in self.at(i, false).into_iter().enumerate() {
+                    range[0][k] = range[0][k].min(x);
+                    range[1][k] = range[1][k].max(x);
+                }
             }
-        }
-        range
+            range
+        });
+        // The curve grows, so it maps extremes to extremes.
+        let curved = content.is_srgb() && !matches!(self.texels, Texels::F32(_));
+        extremes.map(|[r, g, b, a]| {
+            let [r, g, b] = [r, g, b].map(|x| if curved { srgb_to_linear(x) } else { x });
+            [r, g, b, a]
+        })
     }
+}
+
+/// Linear values of the codes of 8 bits.
+static LINEAR_8: LazyLock<Vec<f32>> = LazyLock::new(|| table(255, |x| x));
+/// The same by the sRGB curve.
+static SRGB_8: LazyLock<Vec<f32>> = LazyLock::new(|| table(255, srgb_to_linear));
+/// Linear values of the codes of 16 bits by the sRGB curve.
+static SRGB_16: LazyLock<Vec<f32>> = LazyLock::new(|| table(65535, srgb_to_linear));
+
+fn table(largest: u32, curve: impl Fn(f64) -> f64) -> Vec<f32> {
+    (0..=largest)
+        .map(|i| curve(f64::from(i) / f64::from(largest)) as f32)
+        .collect()
 }

@@ -5,6 +5,6 @@ mod image;
 mod sampler;
 mod texture;
 
-pub use image::Image;
+pub use image::{Content, Image, Texels};
 pub use sampler::{Filter, Sampler, Wrap};
 pub use texture::{Texture, UvTransform};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Filter, Image, Sampler};
+use super::{Content, Filter, Image, Sampler};
 use crate::geometry::Surface;
 
 /// An affine map of texture coordinates (`KHR_texture_transform`).
@@ -13,6 +13,11 @@ pub struct UvTransform {
 }
 
 impl UvTransform {
+    /// Leaves coordinates as they are.
+    pub const IDENTITY: Self = Self {
+        rows: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+    };
+
     /// Translation · rotation · scale, as the extension defines it; the rotation in radians.
     pub fn new(offset: [f64; 2], rotation: f64, scale: [f64; 2]) -> Self {
         let (s, c) = rotation.sin_cos();
@@ -42,6 +47,8 @@ impl UvTransform {
 pub struct Texture {
     /// The image; shared by all textures that show it.
     pub image: Arc<Image>,
+    /// What its numbers mean.
+    pub content: Content,
     /// How it is looked up.
     pub sampler: Sampler,
     /// Which set of texture coordinates places it.
@@ -51,6 +58,27 @@ pub struct Texture {
 }
 
 impl Texture {
+    /// `image` placed by the first set of texture coordinates, repeated and smooth.
+    pub fn new(image: Arc<Image>, content: Content) -> Self {
+        Self {
+            image,
+            content,
+            sampler: Sampler::default(),
+            uv_set: 0,
+            transform: None,
+        }
+    }
+
+    /// Mean over the image, linear.
+    pub fn mean(&self) -> [f64; 4] {
+        self.image.mean(self.content)
+    }
+
+    /// Smallest and largest value of each channel, linear; no lookup leaves them.
+    pub fn range(&self) -> [[f64; 4]; 2] {
+        self.image.range(self.content)
+    }
+
     /// The value at a surface point.
     pub fn sample(&self, at: &Surface<'_>) -> [f64; 4] {
         self.lookup(at.uv(self.uv_set), at.uv_footprint(self.uv_set))
@@ -65,6 +93,7 @@ impl Texture {
             self.image.texel(
                 self.sampler.wrap_u.index(x, w),
                 self.sampler.wrap_v.index(y, h),
+                self.content,
             )
         };
         let (x, y) = (u * f64::from(w), v * f64::from(h));

@@ -1,0 +1,211 @@
+//! Images: found, checked by their headers, and decoded in parallel, each one once.
+//!
+//! Materials are read twice. The first time their textures only say which images they need;
+//! then those are decoded together; the second time textures get them. So images that nothing
+//! shows are not even opened, and no other code has to know in advance which slots there are.
+
+use std::collections::HashMap;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
+use rayon::prelude::*;
+
+use super::accessor::Source;
+use super::json::Cursor;
+use super::{Problem, container};
+use crate::textures::{Image, Texels};
+
+/// Most texels of one image: 16384 × 16384.
+const MAX_TEXELS: u64 = 1 << 28;
+
+/// Most bytes of all decoded images together. A few kilobytes of a well-packed file can claim
+/// gigabytes, so the headers are added up before anything is decoded.
+const MAX_BYTES: u64 = 1 << 33;
+
+/// The images of a file.
+pub(super) struct Images<'a> {
+    root: Cursor<'a>,
+    buffers: &'a [Vec<u8>],
+    file: &'a Path,
+    /// Images that were asked for, by index; `None` until [`decode`](Self::decode).
+    wanted: HashMap<usize, Option<Arc<Image>>>,
+    decoded: bool,
+    placeholder: Arc<Image>,
+}
+
+impl<'a> Images<'a> {
+    /// The images of `file`, none of them decoded.
+    pub(super) fn new(source: &Source<'a>, file: &'a Path) -> Self {
+        Self {
+            root: source.root.clone(),
+            buffers: source.buffers,
+            file,
+            wanted: HashMap::new(),
+            decoded: false,
+            placeholder: Arc::new(Image::white()),
+        }
+    }
+
+    /// The document, for what refers to images.
+    pub(super) fn root(&self) -> &Cursor<'a> {
+        &self.root
+    }
+
+    /// The image whose index stands at `at`. Before [`decode`](Self::decode) this notes that it
+    /// is needed and gives a white texel; so it does after for images that were not asked for
+    /// before.
+    pub(super) fn get(&mut self, at: &Cursor<'a>) -> Result<Arc<Image>, Problem> {
+        let index = at.index()?;
+        self.root.element("images", index, at)?;
+        if !self.decoded {
+            self.wanted.entry(index).or_insert(None);
+        }
+        let image = self.wanted.get(&index).and_then(Option::as_ref);
+        Ok(Arc::clone(image.unwrap_or(&self.placeholder)))
+    }
+
+    /// Reads and decodes, in parallel, what was asked for.
+    pub(super) fn decode(&mut self) -> Result<(), Problem> {
+        self.decoded = true;
+        let mut indices: Vec<usize> = self.wanted.keys().copied().collect();
+        indices.sort_unstable();
+        // Entries that name the same bytes are one image.
+        let mut first: HashMap<String, usize> = HashMap::new();
+        let mut same = Vec::new();
+        let mut tasks = Vec::new();
+        for index in indices {
+            let image = self.root.element("images", index, &self.root)?;
+            let key = match (image.get("uri"), image.get("bufferView")) {
+                (Some(uri), _) => uri.str()?.to_owned(),
+                (None, Some(view)) => format!("\0{}", view.index()?),
+                _ => return Err(image.problem("has neither a URI nor a buffer view")),
+            };
+            match first.get(&key) {
+                Some(&original) => same.push((index, original)),
+                None => {
+                    first.insert(key, index);
+                    tasks.push((index, image));
+                }
+            }
+        }
+        let budget = AtomicU64::new(MAX_BYTES);
+        let results: Vec<(usize, Result<Image, Problem>)> = tasks
+            .par_iter()
+            .map(|(index, image)| (*index, self.load(image, &budget)))
+            .collect();
+        for (index, image) in results {
+            self.wanted.insert(index, Some(Arc::new(image?)));
+        }
+        for (index, original) in same {
+            let image = self.wanted.get(&original).cloned().flatten();
+            self.wanted.insert(index, image);
+        }
+        Ok(())
+    }
+
+    fn load(&self, image: &Cursor<'a>, budget: &AtomicU64) -> Result<Image, Problem> {
+        if let Some(uri) = image.get("uri") {
+            return decode(&container::read_uri(&uri, self.file)?, &uri, budget);
+        }
+        let view = image.need("bufferView")?;
+        decode(self.view(&view)?, image, budget)
+    }
+
+    /// The bytes of the buffer view whose index stands at `at`.
+    fn view(&self, at: &Cursor<'a>) -> Result<&'a [u8], Problem> {
+        let view = self.root.element("bufferViews", at.index()?, at)?;
+        let buffer = view.need("buffer")?;
+        let bytes = self
+            .buffers
+            .get(buffer.index()?)
+            .ok_or_else(|| buffer.problem("names a buffer that does not exist"))?;
+        let start = view.index_or("byteOffset", 0)?;
+        let length = view.need("byteLength")?.index()?;
+        start
+            .checked_add(length)
+            .and_then(|end| bytes.get(start..end))
+            .ok_or_else(|| {
+                view.problem(format!(
+                    "covers {length} bytes from {start} of a buffer of {}",
+                    bytes.len()
+                ))
+            })
+    }
+}
+
+/// Decodes the image file `bytes`, found at `place`. Its format is told by its first bytes:
+/// names and MIME types are often wrong. Embedded colour profiles and orientation are ignored,
+/// as glTF 2.0, 3.8.3 demands. The decoded size is taken off `budget`.
+pub(super) fn decode(
+    bytes: &[u8],
+    place: &Cursor<'_>,
+    budget: &AtomicU64,
+) -> Result<Image, Problem> {
+    let format = match image::guess_format(bytes) {
+        Ok(f @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) => f,
+        Ok(other) => return Err(unknown(place, &format!("is a {other:?} image"))),
+        Err(_) => return Err(unknown(place, "is no image of a known format")),
+    };
+    let broken = |e: ImageError| place.problem(format!("cannot be decoded ({e})"));
+    let decoder = ImageReader::with_format(io::Cursor::new(bytes), format)
+        .into_decoder()
+        .map_err(broken)?;
+    let (width, height) = decoder.dimensions();
+    claim(width, height, decoder.total_bytes(), place, budget)?;
+    let pixels = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    let (channels, texels) = match pixels {
+        DynamicImage::ImageLuma8(i) => (1, Texels::U8(i.into_raw())),
+        DynamicImage::ImageLumaA8(i) => (2, Texels::U8(i.into_raw())),
+        DynamicImage::ImageRgb8(i) => (3, Texels::U8(i.into_raw())),
+        DynamicImage::ImageRgba8(i) => (4, Texels::U8(i.into_raw())),
+        DynamicImage::ImageLuma16(i) => (1, Texels::U16(i.into_raw())),
+        DynamicImage::ImageLumaA16(i) => (2, Texels::U16(i.into_raw())),
+        DynamicImage::ImageRgb16(i) => (3, Texels::U16(i.into_raw())),
+        DynamicImage::ImageRgba16(i) => (4, Texels::U16(i.into_raw())),
+        other => (4, Texels::U8(other.into_rgba8().into_raw())),
+    };
+    Image::from_texels(width, height, channels, texels)
+        .ok_or_else(|| place.problem(format!("is an image of {width} × {height} texels")))
+}
+
+/// Refuses images that are too large, by what their header says.
+fn claim(
+    width: u32,
+    height: u32,
+    bytes: u64,
+    place: &Cursor<'_>,
+    budget: &AtomicU64,
+) -> Result<(), Problem> {
+    if u64::from(width) * u64::from(height) > MAX_TEXELS {
+        return Err(Problem::unsupported(
+            place.path(),
+            format!("is an image of {width} × {height} texels, more than {MAX_TEXELS}"),
+            "make it smaller",
+        ));
+    }
+    let taken = budget.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+        left.checked_sub(bytes)
+    });
+    if taken.is_err() {
+        return Err(Problem::unsupported(
+            place.path(),
+            format!(
+                "with this one the images take more than {} GiB decoded",
+                MAX_BYTES >> 30
+            ),
+            "make them smaller",
+        ));
+    }
+    Ok(())
+}
+
+fn unknown(place: &Cursor<'_>, what: &str) -> Problem {
+    Problem::unsupported(
+        place.path(),
+        what,
+        "convert it to PNG, JPEG or WebP and export again",
+    )
+}
