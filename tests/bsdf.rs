@@ -54,6 +54,7 @@ fn difference(a: Rgb, b: Rgb) -> f64 {
 /// Index of refraction behind `wi` over that behind `wo`.
 fn eta(s: &Specimen, wo: DVec3, wi: DVec3) -> f64 {
     match (wo.z > 0.0, wi.z > 0.0) {
+        _ if !s.desc.volume => 1.0,
         (true, false) => s.desc.ior,
         (false, true) => 1.0 / s.desc.ior,
         _ => 1.0,
@@ -198,9 +199,6 @@ fn albedo(s: &Specimen, wo: DVec3, mode: TransportMode, n: u32) -> [Samples; 3] 
 
 #[test]
 fn no_surface_returns_more_than_it_gets() {
-    // glTF's coat (2.0, B.3.5) takes from the base what it reflects toward the half vector, not
-    // what it reflects in all: a model that gives too much at grazing angles, by the base's
-    // albedo at most. So mixtures are held to one without their base, and to that with it.
     let mut all = views(&ROUGHNESSES);
     for roughness in ROUGHNESSES {
         let entry = dualight::materials::MATERIALS.last().expect("pbr");
@@ -225,25 +223,20 @@ fn no_surface_returns_more_than_it_gets() {
             ));
         }
     }
-    let (mut worst, mut coated) = ((0.0, String::new()), (0.0, String::new()));
+    let mut worst = (0.0, String::new());
     for (s, cosines) in all {
-        let sum = if s.name.starts_with("pbr") {
-            &mut coated
-        } else {
-            &mut worst
-        };
         for cos in cosines {
             for c in albedo(&s, direction(cos, 1.0), TransportMode::Importance, 500) {
                 let least = c.mean() - 4.0 * c.sigma();
-                if least > sum.0 {
-                    *sum = (least, format!("{} at {cos}: {}", s.name, c.mean()));
+                if least > worst.0 {
+                    worst = (least, format!("{} at {cos}: {}", s.name, c.mean()));
                 }
             }
         }
     }
-    println!("largest albedo less four sigma: {worst:?}; of glTF's coats {coated:?}");
-    assert!(worst.0 <= 1.0 + 1e-9, "{worst:?}");
-    assert!(coated.0 <= 1.0 + 0.8 * 0.96, "{coated:?}");
+    println!("largest albedo less four sigma: {worst:?}");
+    // Layers are scaled by tabulated albedos, good to about 2e-3.
+    assert!(worst.0 <= 1.0 + 4e-3, "{worst:?}");
 }
 
 #[test]

@@ -7,6 +7,7 @@
 
 use arrayvec::ArrayVec;
 
+use super::cover::Cover;
 use super::lobes::{Lobe, LobeClass, LobeModel};
 use crate::color::Rgb;
 use crate::geometry::SurfacePoint;
@@ -47,18 +48,51 @@ pub struct BsdfValue {
 }
 
 /// Most lobes a material stacks.
-const MAX_LOBES: usize = 6;
+const MAX_LOBES: usize = 8;
+
+/// Least cosine between `wo` and a normal that a normal map gave.
+const LEAST_COSINE: f64 = 1e-2;
+
+/// One of the frames in which the lobes at a point lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameId(u8);
+
+impl FrameId {
+    /// That of the shading normal.
+    pub const MAIN: Self = Self(0);
+}
+
+/// A frame with `wo` in it.
+#[derive(Clone, Copy, Debug)]
+struct View {
+    frame: Frame,
+    wo: DVec3,
+}
+
+/// A lobe of the stack.
+#[derive(Clone, Debug)]
+struct Entry {
+    lobe: Lobe,
+    /// Its share of the samples, times [`Bsdf::total`].
+    pick: f64,
+    frame: FrameId,
+    /// The first of the layers above it.
+    under: u8,
+}
 
 /// The scattering function at one point, seen from one direction.
 #[derive(Clone, Debug)]
 pub struct Bsdf {
-    frame: Frame,
+    main: View,
+    /// A second frame, for a coat with a normal of its own.
+    second: Option<View>,
     /// Geometric normal on the side of `wo`.
     ng: DVec3,
-    wo: DVec3,
     wo_world: DVec3,
+    front: bool,
     mode: TransportMode,
-    lobes: ArrayVec<(Lobe, f64), MAX_LOBES>,
+    lobes: ArrayVec<Entry, MAX_LOBES>,
+    covers: ArrayVec<(Cover, FrameId), 2>,
     total: f64,
 }
 
@@ -77,30 +111,137 @@ impl Bsdf {
         }
         let frame = Frame::from_normal(n);
         Self {
-            wo: frame.to_local(sp.wo),
+            main: View {
+                wo: frame.to_local(sp.wo),
+                frame,
+            },
+            second: None,
             wo_world: sp.wo,
-            frame,
+            front: sp.front,
             ng,
             mode,
             lobes: ArrayVec::new(),
+            covers: ArrayVec::new(),
             total: 0.0,
         }
+    }
+
+    #[inline(always)]
+    fn view(&self, id: FrameId) -> &View {
+        match &self.second {
+            Some(second) if id != FrameId::MAIN => second,
+            _ => &self.main,
+        }
+    }
+
+    /// The frame around `n`, given on the front of the surface. A normal that faces away from
+    /// `wo` is turned until it does not, as no lobe is defined below its horizon.
+    fn view_around(&self, n: DVec3, tangent: Option<DVec3>) -> View {
+        let mut n = if self.front { n } else { -n };
+        let cos = n.dot(self.wo_world);
+        if cos < LEAST_COSINE {
+            n = (n + self.wo_world * (LEAST_COSINE - cos))
+                .try_normalize()
+                .unwrap_or(self.ng);
+        }
+        let frame = tangent
+            .and_then(|t| Frame::from_normal_and_tangent(n, t))
+            .unwrap_or_else(|| Frame::from_normal(n));
+        View {
+            wo: frame.to_local(self.wo_world),
+            frame,
+        }
+    }
+
+    /// Takes another shading normal, given on the front of the surface. To be called before
+    /// lobes are pushed.
+    pub fn set_normal(&mut self, n: DVec3) {
+        self.main = self.view_around(n, None);
+    }
+
+    /// Turns the frame about its normal, so that its first axis follows `tangent`. To be called
+    /// before lobes are pushed.
+    pub fn set_tangent(&mut self, tangent: DVec3) {
+        let n = self.main.frame.z;
+        if let Some(frame) = Frame::from_normal_and_tangent(n, tangent) {
+            self.main = View {
+                wo: frame.to_local(self.wo_world),
+                frame,
+            };
+        }
+    }
+
+    /// A second frame around `n`, given on the front of the surface.
+    pub fn add_frame(&mut self, n: DVec3) -> FrameId {
+        self.second = Some(self.view_around(n, None));
+        FrameId(1)
     }
 
     /// Cosine between `wo` and the shading normal on its side.
     #[inline]
     pub fn cos_o(&self) -> f64 {
-        self.wo.z
+        self.main.wo.z
     }
 
     /// Adds a lobe; it is picked in proportion to its albedo. A black lobe is left out.
     #[inline]
     pub fn push(&mut self, lobe: impl Into<Lobe>) {
+        self.push_in(lobe, FrameId::MAIN);
+    }
+
+    /// As [`push`](Self::push), in one of the frames.
+    #[inline]
+    pub fn push_in(&mut self, lobe: impl Into<Lobe>, frame: FrameId) {
         let lobe = lobe.into();
-        let pick = lobe.albedo(self.wo).max_channel();
-        if pick > 0.0 && self.lobes.try_push((lobe, pick)).is_ok() {
-            self.total += pick;
+        let pick = lobe.albedo(self.view(frame).wo).max_channel();
+        let entry = Entry {
+            lobe,
+            pick,
+            frame,
+            under: self.covers.len() as u8,
+        };
+        if pick > 0.0 {
+            let full = self.lobes.try_push(entry).is_err();
+            debug_assert!(!full, "more lobes than a material may stack");
+            if !full {
+                self.total += pick;
+            }
         }
+    }
+
+    /// Lays a layer over all lobes pushed so far.
+    pub(super) fn cover(&mut self, cover: Cover, frame: FrameId) {
+        let passes = cover.passes(self.view(frame).wo.z);
+        if self.covers.try_push((cover, frame)).is_err() {
+            debug_assert!(false, "more layers than a material may stack");
+            return;
+        }
+        self.total = 0.0;
+        for e in &mut self.lobes {
+            e.pick *= passes;
+            self.total += e.pick;
+        }
+    }
+
+    /// What the layers above a lobe leave of the light that comes along `wi`.
+    #[inline]
+    fn uncovered(&self, under: u8, wi: DVec3) -> f64 {
+        let mut left = 1.0;
+        for (cover, frame) in self.covers.iter().skip(usize::from(under)) {
+            let view = self.view(*frame);
+            let cos_i = view.frame.z.dot(wi);
+            left *= cover.passes(view.wo.z).min(cover.passes(cos_i));
+        }
+        left
+    }
+
+    /// What the layers above a lobe leave of its albedo.
+    fn uncovered_albedo(&self, e: &Entry) -> Rgb {
+        let mut albedo = e.lobe.albedo(self.view(e.frame).wo);
+        for (cover, frame) in self.covers.iter().skip(usize::from(e.under)) {
+            albedo *= cover.passes(self.view(*frame).wo.z);
+        }
+        albedo
     }
 
     /// Whether some lobe is diffuse: only there photons are stored.
@@ -108,7 +249,7 @@ impl Bsdf {
     pub fn has_diffuse(&self) -> bool {
         self.lobes
             .iter()
-            .any(|(l, _)| l.class() == LobeClass::Diffuse)
+            .any(|e| e.lobe.class() == LobeClass::Diffuse)
     }
 
     /// Whether some lobe is neither diffuse nor black.
@@ -116,7 +257,7 @@ impl Bsdf {
     pub fn has_specular(&self) -> bool {
         self.lobes
             .iter()
-            .any(|(l, _)| l.class() != LobeClass::Diffuse)
+            .any(|e| e.lobe.class() != LobeClass::Diffuse)
     }
 
     /// Whether light sampling can contribute: some lobe is not a delta.
@@ -124,21 +265,27 @@ impl Bsdf {
     pub fn has_finite(&self) -> bool {
         self.lobes
             .iter()
-            .any(|(l, _)| l.class() != LobeClass::Delta)
+            .any(|e| e.lobe.class() != LobeClass::Delta)
     }
 
     /// The albedo if the surface is one Lambert lobe and nothing else.
     #[inline]
     pub fn as_lambert(&self) -> Option<Rgb> {
         match self.lobes.as_slice() {
-            [(Lobe::Lambert(l), _)] => Some(l.albedo),
+            [
+                Entry {
+                    lobe: Lobe::Lambert(l),
+                    under,
+                    ..
+                },
+            ] if usize::from(*under) == self.covers.len() => Some(l.albedo),
             _ => None,
         }
     }
 
     /// Sum of the lobes' albedos.
     pub fn albedo(&self) -> Rgb {
-        self.lobes.iter().map(|(l, _)| l.albedo(self.wo)).sum()
+        self.lobes.iter().map(|e| self.uncovered_albedo(e)).sum()
     }
 
     /// Probability that [`sample`](Self::sample) picks a diffuse lobe.
@@ -147,8 +294,8 @@ impl Bsdf {
         let diffuse = self
             .lobes
             .iter()
-            .filter(|(l, _)| l.class() == LobeClass::Diffuse);
-        diffuse.map(|(_, p)| p).sum::<f64>() / self.total
+            .filter(|e| e.lobe.class() == LobeClass::Diffuse);
+        diffuse.map(|e| e.pick).sum::<f64>() / self.total
     }
 
     /// The same point with only its diffuse lobes.
@@ -165,15 +312,15 @@ impl Bsdf {
 
     fn filtered(&self, keep: impl Fn(LobeClass) -> bool) -> Self {
         let mut out = self.clone();
-        out.lobes.retain(|(l, _)| keep(l.class()));
-        out.total = out.lobes.iter().map(|(_, p)| p).sum();
+        out.lobes.retain(|e| keep(e.lobe.class()));
+        out.total = out.lobes.iter().map(|e| e.pick).sum();
         out
     }
 
     /// The factor that makes `f` adjoint: η² for refracted radiance, and the correction for
     /// shading normals when importance is transported (Veach 1997, 5.2 and 5.3.2).
     #[inline(always)]
-    fn transport_factor(&self, wi: DVec3, wi_local: DVec3, eta: f64) -> f64 {
+    fn transport_factor(&self, wo: DVec3, wi: DVec3, wi_local: DVec3, eta: f64) -> f64 {
         match self.mode {
             TransportMode::Radiance => {
                 if wi_local.z < 0.0 {
@@ -183,7 +330,7 @@ impl Bsdf {
                 }
             }
             TransportMode::Importance => {
-                let num = self.wo.z * wi.dot(self.ng);
+                let num = wo.z * wi.dot(self.ng);
                 let den = self.wo_world.dot(self.ng) * wi_local.z;
                 if den == 0.0 { 0.0 } else { (num / den).abs() }
             }
@@ -202,31 +349,45 @@ impl Bsdf {
     #[inline(always)]
     pub fn eval(&self, wi: DVec3, weight: impl Fn(f64) -> f64) -> BsdfValue {
         let mut out = BsdfValue::default();
-        let local = self.frame.to_local(wi);
-        if !self.sides_agree(wi, local) {
-            return out;
-        }
+        let main = self.main.frame.to_local(wi);
         // By far the commonest surface needs neither loop nor dispatch.
-        if let [(Lobe::Lambert(lobe), _)] = self.lobes.as_slice() {
-            let (f, pdf) = lobe.eval(self.wo, local);
-            let factor = self.transport_factor(wi, local, 1.0);
-            out.diffuse = f * (local.z * factor * weight(pdf));
+        if let [
+            Entry {
+                lobe: Lobe::Lambert(lobe),
+                ..
+            },
+        ] = self.lobes.as_slice()
+            && self.covers.is_empty()
+        {
+            if self.sides_agree(wi, main) {
+                let (f, pdf) = lobe.eval(self.main.wo, main);
+                let factor = self.transport_factor(self.main.wo, wi, main, 1.0);
+                out.diffuse = f * (main.z * factor * weight(pdf));
+            }
             return out;
         }
-        for (lobe, pick) in &self.lobes {
-            let class = lobe.class();
+        for e in &self.lobes {
+            let class = e.lobe.class();
             if class == LobeClass::Delta {
                 continue;
             }
-            let (f, pdf) = lobe.eval(self.wo, local);
+            let (wo, local) = match &self.second {
+                Some(view) if e.frame != FrameId::MAIN => (view.wo, view.frame.to_local(wi)),
+                _ => (self.main.wo, main),
+            };
+            if !self.sides_agree(wi, local) {
+                continue;
+            }
+            let (f, pdf) = e.lobe.eval(wo, local);
             if f.is_black() {
                 continue;
             }
-            let factor = self.transport_factor(wi, local, lobe.eta());
+            let factor =
+                self.transport_factor(wo, wi, local, e.lobe.eta()) * self.uncovered(e.under, wi);
             let pdf = if self.lobes.len() == 1 {
                 pdf
             } else {
-                pdf * pick / self.total
+                pdf * e.pick / self.total
             };
             let value = f * (local.z.abs() * factor * weight(pdf));
             match class {
@@ -240,31 +401,42 @@ impl Bsdf {
     /// Diffuse `f` (without cosine) toward `wi`, as density estimates need it.
     #[inline]
     pub fn diffuse_f(&self, wi: DVec3) -> Rgb {
-        let local = self.frame.to_local(wi);
-        if !self.sides_agree(wi, local) {
-            return Rgb::ZERO;
+        let mut sum = Rgb::ZERO;
+        for e in &self.lobes {
+            if e.lobe.class() == LobeClass::Diffuse {
+                let view = self.view(e.frame);
+                let local = view.frame.to_local(wi);
+                if self.sides_agree(wi, local) {
+                    sum += e.lobe.eval(view.wo, local).0 * self.uncovered(e.under, wi);
+                }
+            }
         }
-        self.lobes
-            .iter()
-            .filter(|(l, _)| l.class() == LobeClass::Diffuse)
-            .map(|(l, _)| l.eval(self.wo, local).0)
-            .sum()
+        sum
+    }
+
+    /// Whether some diffuse lobe lets light through: photons on the other side count too.
+    #[inline]
+    pub fn has_diffuse_transmission(&self) -> bool {
+        let through = |e: &Entry| matches!(e.lobe, Lobe::DiffuseTransmission(_));
+        self.lobes.iter().any(through)
     }
 
     /// Every direction that the delta lobes send light to, if all lobes are deltas and there are
     /// few; the weights are `f·|cos θi|`, without probabilities.
     pub fn branches(&self) -> Option<ArrayVec<BsdfSample, 4>> {
         let mut out = ArrayVec::new();
-        for (lobe, _) in &self.lobes {
-            if lobe.class() != LobeClass::Delta {
+        for e in &self.lobes {
+            if e.lobe.class() != LobeClass::Delta {
                 return None;
             }
-            for s in lobe.branches(self.wo) {
-                let wi = self.frame.to_world(s.wi);
+            let view = self.view(e.frame);
+            for s in e.lobe.branches(view.wo) {
+                let wi = view.frame.to_world(s.wi);
                 if !self.sides_agree(wi, s.wi) || s.weight.is_black() {
                     continue;
                 }
-                let factor = self.transport_factor(wi, s.wi, lobe.eta());
+                let factor = self.transport_factor(view.wo, wi, s.wi, e.lobe.eta())
+                    * self.uncovered(e.under, wi);
                 out.try_push(BsdfSample {
                     wi,
                     weight: s.weight * factor,
@@ -282,28 +454,31 @@ impl Bsdf {
     #[inline]
     pub fn sample(&self, u_lobe: f64, u: [f64; 2]) -> Option<BsdfSample> {
         let (last, firsts) = self.lobes.split_last()?;
-        let (mut lobe, mut p_lobe, mut u_in) = (&last.0, 1.0, u_lobe);
+        let (mut chosen, mut p_lobe, mut u_in) = (last, 1.0, u_lobe);
         if !firsts.is_empty() {
             let mut rest = u_lobe * self.total;
-            let mut chosen = last;
             for entry in firsts {
-                if rest < entry.1 {
+                if rest < entry.pick {
                     chosen = entry;
                     break;
                 }
-                rest -= entry.1;
+                rest -= entry.pick;
             }
-            lobe = &chosen.0;
-            p_lobe = chosen.1 / self.total;
+            p_lobe = chosen.pick / self.total;
             // Within the lobe, what is left of u_lobe is uniform again.
-            u_in = (rest / chosen.1).clamp(0.0, 1.0 - f64::EPSILON);
+            u_in = (rest / chosen.pick).clamp(0.0, 1.0 - f64::EPSILON);
         }
-        let s = lobe.sample(self.wo, u_in, u)?;
-        let wi = self.frame.to_world(s.wi);
+        let lobe = &chosen.lobe;
+        let view = self.view(chosen.frame);
+        let s = lobe.sample(view.wo, u_in, u)?;
+        let wi = view.frame.to_world(s.wi);
         if !self.sides_agree(wi, s.wi) {
             return None;
         }
-        let factor = self.transport_factor(wi, s.wi, lobe.eta());
+        let mut factor = self.transport_factor(view.wo, wi, s.wi, lobe.eta());
+        if !self.covers.is_empty() {
+            factor *= self.uncovered(chosen.under, wi);
+        }
         Some(BsdfSample {
             wi,
             weight: if p_lobe == 1.0 {

@@ -38,6 +38,6 @@ fn build(d: &MaterialDesc) -> Result<Box<dyn Material>, String> {
 pub(super) const ENTRY: MaterialEntry = MaterialEntry {
     name: "conductor",
     doc: "a rough metal: GGX with visible-normal sampling",
-    claims: |d| d.metallic == 1.0,
+    claims: |d| d.is_plain() && d.metallic == 1.0,
     build,
 };

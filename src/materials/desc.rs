@@ -1,16 +1,41 @@
 //! What a material is made from, and what it promises.
 
+use std::sync::Arc;
+
 use serde_json::Value;
 
+use super::slots::TextureSlots;
 use crate::color::Rgb;
 
+/// What a material's alpha means (glTF 2.0, 3.9.4).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Nothing: the surface is whole.
+    #[default]
+    Opaque,
+    /// The surface is missing where alpha is below the cutoff.
+    Mask {
+        /// `alphaCutoff`.
+        cutoff: f64,
+    },
+    /// Alpha is the share of light that the surface stops.
+    Blend,
+}
+
 /// Parameters of a glTF material, with the specification's defaults. Colours are linear.
+/// Factors multiply the textures of [`textures`](Self::textures), where there are any.
 #[derive(Clone, Debug)]
 pub struct MaterialDesc {
     /// Name, for messages.
     pub name: String,
     /// `baseColorFactor`, without alpha.
     pub base_color: Rgb,
+    /// Alpha of `baseColorFactor`.
+    pub base_alpha: f64,
+    /// What alpha means.
+    pub alpha_mode: AlphaMode,
+    /// Whether the vertices' colours multiply the base colour.
+    pub vertex_colors: bool,
     /// `metallicFactor`, 0 to 1.
     pub metallic: f64,
     /// `roughnessFactor`, 0 to 1; the microfacet width is its square.
@@ -21,6 +46,9 @@ pub struct MaterialDesc {
     pub specular: f64,
     /// `KHR_materials_specular`: colour of the dielectric reflection at normal incidence.
     pub specular_color: Rgb,
+    /// `KHR_materials_pbrSpecularGlossiness`: reflectance at normal incidence; `base_color` is
+    /// then the diffuse colour and `roughness` one less the glossiness.
+    pub specular_reflectance: Option<Rgb>,
     /// `KHR_materials_transmission`: share of the base that transmits.
     pub transmission: f64,
     /// `KHR_materials_volume`: whether the surface bounds a volume (thickness above zero);
@@ -31,10 +59,38 @@ pub struct MaterialDesc {
     pub attenuation_distance: f64,
     /// `KHR_materials_volume`: see above.
     pub attenuation_color: Rgb,
+    /// `KHR_materials_dispersion`: 20 over the Abbe number; 0 for none.
+    pub dispersion: f64,
+    /// `KHR_materials_diffuse_transmission`: share of the diffuse base that goes through.
+    pub diffuse_transmission: f64,
+    /// `KHR_materials_diffuse_transmission`: its colour.
+    pub diffuse_transmission_color: Rgb,
+    /// `KHR_materials_clearcoat`: strength.
+    pub clearcoat: f64,
+    /// `KHR_materials_clearcoat`: roughness.
+    pub clearcoat_roughness: f64,
+    /// `KHR_materials_sheen`: colour; black for none.
+    pub sheen_color: Rgb,
+    /// `KHR_materials_sheen`: roughness.
+    pub sheen_roughness: f64,
+    /// `KHR_materials_anisotropy`: strength.
+    pub anisotropy: f64,
+    /// `KHR_materials_anisotropy`: rotation from the tangent, counter-clockwise, in radians.
+    pub anisotropy_rotation: f64,
+    /// `KHR_materials_iridescence`: strength.
+    pub iridescence: f64,
+    /// `KHR_materials_iridescence`: index of refraction of the film.
+    pub iridescence_ior: f64,
+    /// `KHR_materials_iridescence`: least and greatest thickness of the film in nanometres.
+    pub iridescence_thickness: [f64; 2],
     /// Emitted radiance in W/(m²·sr).
     pub emission: Rgb,
     /// Whether the back face emits too.
     pub double_sided: bool,
+    /// `KHR_materials_unlit`: shown in its base colour, whatever the light.
+    pub unlit: bool,
+    /// The textures, if there are any.
+    pub textures: Option<Arc<TextureSlots>>,
     /// The material's `extras`, for kinds of one's own.
     pub extras: Value,
 }
@@ -44,17 +100,35 @@ impl Default for MaterialDesc {
         Self {
             name: "default".into(),
             base_color: Rgb::ONE,
+            base_alpha: 1.0,
+            alpha_mode: AlphaMode::Opaque,
+            vertex_colors: false,
             metallic: 1.0,
             roughness: 1.0,
             ior: 1.5,
             specular: 1.0,
             specular_color: Rgb::ONE,
+            specular_reflectance: None,
             transmission: 0.0,
             volume: false,
             attenuation_distance: f64::INFINITY,
             attenuation_color: Rgb::ONE,
+            dispersion: 0.0,
+            diffuse_transmission: 0.0,
+            diffuse_transmission_color: Rgb::ONE,
+            clearcoat: 0.0,
+            clearcoat_roughness: 0.0,
+            sheen_color: Rgb::ZERO,
+            sheen_roughness: 0.0,
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            iridescence: 0.0,
+            iridescence_ior: 1.3,
+            iridescence_thickness: [100.0, 400.0],
             emission: Rgb::ZERO,
             double_sided: false,
+            unlit: false,
+            textures: None,
             extras: Value::Null,
         }
     }
@@ -70,10 +144,29 @@ impl MaterialDesc {
         self.roughness < Self::SMOOTH
     }
 
+    /// Whether it is the same everywhere and has none of the layers that only the general
+    /// material knows.
+    pub fn is_plain(&self) -> bool {
+        let textured = self
+            .textures
+            .as_ref()
+            .is_some_and(|t| t.iter().any(|(slot, _)| slot != "emissiveTexture"));
+        !textured
+            && !self.unlit
+            && !self.vertex_colors
+            && self.specular_reflectance.is_none()
+            && self.dispersion == 0.0
+            && self.diffuse_transmission == 0.0
+            && self.clearcoat == 0.0
+            && self.sheen_color.is_black()
+            && self.anisotropy == 0.0
+            && self.iridescence == 0.0
+    }
+
     /// The enclosed medium, if it absorbs (Beer–Lambert).
     pub fn interior(&self) -> Option<Interior> {
         let absorbs = self.volume
-            && self.transmission > 0.0
+            && self.transmission.max(self.diffuse_transmission) > 0.0
             && self.attenuation_distance.is_finite()
             && self.attenuation_distance > 0.0;
         absorbs.then(|| Interior {

@@ -1,7 +1,8 @@
 //! `dielectric`: clear glass, smooth or rough, solid or thin-walled. In glTF: metallic 0,
 //! transmission 1; solid with `KHR_materials_volume`, thin-walled without.
 
-use super::lobes::{GgxDielectric, Lobe, SmoothDielectric, ThinDielectric};
+use super::lobes::{GgxDielectric, Lobe, SmoothDielectric, ThinDielectric, ThinGgx};
+use super::microfacet::Ggx;
 use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
 use crate::geometry::Surface;
@@ -9,13 +10,17 @@ use crate::geometry::Surface;
 /// The transmitting part of a dielectric; shared with the general glTF material.
 #[derive(Clone, Copy)]
 pub(super) struct Interface {
-    ior: f64,
-    tint: Rgb,
+    pub(super) ior: f64,
+    /// 20 over the Abbe number.
+    pub(super) dispersion: f64,
+    pub(super) tint: Rgb,
+    /// Colour of the reflection, white for all of it.
+    pub(super) reflect: Rgb,
     /// Share of the surface that transmits: neither metal nor opaque.
-    share: f64,
-    alpha: f64,
-    smooth: bool,
-    thin: bool,
+    pub(super) share: f64,
+    pub(super) ggx: Ggx,
+    pub(super) smooth: bool,
+    pub(super) thin: bool,
 }
 
 impl Interface {
@@ -28,35 +33,68 @@ impl Interface {
         }
         Ok(Self {
             ior: d.ior,
+            dispersion: 0.0,
             tint: d.base_color,
+            reflect: Rgb::ONE,
             share: d.transmission * (1.0 - d.metallic),
-            alpha: d.roughness.max(MaterialDesc::SMOOTH).powi(2),
+            ggx: Ggx::round(d.roughness.max(MaterialDesc::SMOOTH).powi(2)),
             // Index 1 bends nothing, however rough: a delta that light sampling leaves alone.
-            smooth: d.is_smooth() || d.ior == 1.0,
+            smooth: d.is_smooth() || (d.ior == 1.0 && d.volume),
             thin: !d.volume,
         })
     }
 
-    /// The lobe, seen from the front or from inside.
+    /// Pushes the lobes, seen from the front or from inside: one, or one for each channel if
+    /// the index depends on the wavelength.
     #[inline]
-    pub(super) fn lobe(&self, front: bool) -> Lobe {
-        let eta = if front { self.ior } else { 1.0 / self.ior };
-        match (self.thin, self.smooth) {
-            // A rough thin wall scatters less than its roughness says, since what one face
-            // bends the other bends back: the pane is treated as clear.
-            (true, _) => ThinDielectric {
-                eta: self.ior,
-                tint: self.tint,
-                share: self.share,
+    pub(super) fn push(&self, front: bool, bsdf: &mut Bsdf) {
+        if self.dispersion > 0.0 && !self.thin {
+            // KHR_materials_dispersion: the indices of red, green and blue.
+            let half = (self.ior - 1.0) * 0.025 * self.dispersion;
+            let channels = [
+                Rgb::new(1.0, 0.0, 0.0),
+                Rgb::new(0.0, 1.0, 0.0),
+                Rgb::new(0.0, 0.0, 1.0),
+            ];
+            for (ior, channel) in [self.ior - half, self.ior, self.ior + half]
+                .into_iter()
+                .zip(channels)
+            {
+                bsdf.push(self.lobe(front, ior.max(1.0), channel * self.share));
             }
-            .into(),
-            (false, true) => SmoothDielectric {
-                eta,
-                tint: self.tint,
-                share: self.share,
-            }
-            .into(),
-            (false, false) => GgxDielectric::new(self.alpha, eta, self.tint, self.share).into(),
+        } else {
+            bsdf.push(self.lobe(front, self.ior, Rgb::splat(self.share)));
+        }
+    }
+
+    #[inline]
+    fn lobe(&self, front: bool, ior: f64, share: Rgb) -> Lobe {
+        let Self {
+            tint, reflect, ggx, ..
+        } = *self;
+        if self.thin {
+            let facet = ThinDielectric {
+                eta: ior,
+                tint,
+                reflect,
+                share,
+            };
+            return if self.smooth {
+                facet.into()
+            } else {
+                ThinGgx { ggx, facet }.into()
+            };
+        }
+        let facet = SmoothDielectric {
+            eta: if front { ior } else { 1.0 / ior },
+            tint,
+            reflect,
+            share,
+        };
+        if self.smooth {
+            facet.into()
+        } else {
+            GgxDielectric { ggx, facet }.into()
         }
     }
 
@@ -73,7 +111,7 @@ struct DielectricMaterial {
 impl Material for DielectricMaterial {
     #[inline]
     fn scatter(&self, at: &Surface<'_>, bsdf: &mut Bsdf) {
-        bsdf.push(self.interface.lobe(at.sp.front));
+        self.interface.push(at.sp.front, bsdf);
     }
 
     fn traits(&self) -> MaterialTraits {
@@ -102,7 +140,8 @@ pub(super) const ENTRY: MaterialEntry = MaterialEntry {
     name: "dielectric",
     doc: "clear glass with exact Fresnel terms: smooth or rough, solid or thin-walled",
     claims: |d| {
-        d.metallic == 0.0
+        d.is_plain()
+            && d.metallic == 0.0
             && d.transmission == 1.0
             && d.specular == 1.0
             && d.specular_color == Rgb::ONE

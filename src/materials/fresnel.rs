@@ -3,6 +3,7 @@
 //! Transmittance is computed directly: `1 − R` in single precision loses 1.6 % at a cosine of
 //! 1e-6, and digits at every grazing angle.
 
+use super::thin_film::ThinFilm;
 use crate::color::Rgb;
 
 /// Reflectance, transmittance and cosine of refraction of a smooth dielectric interface.
@@ -42,6 +43,18 @@ pub fn dielectric(cos_i: f64, eta: f64) -> Dielectric {
     }
 }
 
+/// Reflected and transmitted colour of an interface that reflects `reflect` of what Fresnel says
+/// and colours what it transmits by `tint`. What is not reflected is transmitted, and under total
+/// internal reflection nothing is.
+#[inline]
+pub fn split(f: &Dielectric, reflect: Rgb, tint: Rgb) -> [Rgb; 2] {
+    if f.cos_t == 0.0 {
+        return [Rgb::ONE, Rgb::ZERO];
+    }
+    let through = f.transmittance + f.reflectance * (1.0 - reflect.max_channel()).max(0.0);
+    [reflect * f.reflectance, tint * through]
+}
+
 /// Schlick's approximation between `f0` at normal and `f90` at grazing incidence.
 #[inline]
 pub fn schlick(f0: Rgb, f90: f64, cos: f64) -> Rgb {
@@ -65,6 +78,50 @@ impl Schlick {
     #[inline]
     pub fn at(&self, cos: f64) -> Rgb {
         schlick(self.f0, self.f90, cos)
+    }
+}
+
+/// Fresnel term of a microfacet reflection.
+#[derive(Clone, Copy, Debug)]
+pub enum Fresnel {
+    /// A plain surface.
+    Schlick(Schlick),
+    /// A thin film on part of it (`KHR_materials_iridescence`).
+    Film {
+        /// The surface.
+        base: Schlick,
+        /// The film.
+        film: ThinFilm,
+        /// Share of the film.
+        strength: f64,
+        /// What `base` is scaled by.
+        share: f64,
+    },
+}
+
+impl From<Schlick> for Fresnel {
+    #[inline]
+    fn from(s: Schlick) -> Self {
+        Self::Schlick(s)
+    }
+}
+
+impl Fresnel {
+    /// Reflectance at the cosine of the angle to the microfacet.
+    #[inline]
+    pub fn at(&self, cos: f64) -> Rgb {
+        match self {
+            Self::Schlick(s) => s.at(cos),
+            Self::Film {
+                base,
+                film,
+                strength,
+                share,
+            } => {
+                let bare = base.f0 / share.max(f64::MIN_POSITIVE);
+                base.at(cos) * (1.0 - strength) + film.reflectance(cos, bare) * (strength * share)
+            }
+        }
     }
 }
 

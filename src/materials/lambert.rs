@@ -30,7 +30,7 @@ impl Material for LambertMaterial {
 pub(super) const ENTRY: MaterialEntry = MaterialEntry {
     name: "lambert",
     doc: "ideal diffuse reflection",
-    claims: |d| d.metallic == 0.0 && d.transmission == 0.0 && d.specular == 0.0,
+    claims: |d| d.is_plain() && d.metallic == 0.0 && d.transmission == 0.0 && d.specular == 0.0,
     build: |d| {
         Ok(Box::new(LambertMaterial {
             albedo: d.base_color,

@@ -1,4 +1,4 @@
-//! The isotropic GGX distribution and the sampling of its visible normals.
+//! The GGX distribution, round or stretched along the frame's axes, and the sampling of its visible normals.
 //!
 //! Sources: Walter et al., *Microfacet Models for Refraction through Rough Surfaces*, EGSR 2007;
 //! Heitz, *Understanding the Masking-Shadowing Function*, JCGT 3(2), 2014; Dupuy and Benyoub,
@@ -8,20 +8,27 @@ use std::f64::consts::PI;
 
 use crate::math::DVec3;
 
-/// GGX with width `alpha` (the square of glTF's roughness).
+/// GGX with its widths along the frame's first and second axis (the square of glTF's roughness).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ggx {
-    pub(super) alpha: f64,
+    pub(super) x: f64,
+    pub(super) y: f64,
 }
 
 impl Ggx {
+    /// The same width in all directions.
+    #[inline]
+    pub(super) fn round(alpha: f64) -> Self {
+        Self { x: alpha, y: alpha }
+    }
+
     /// Density of microfacet normals per projected area.
     #[inline]
     pub(super) fn d(&self, h: DVec3) -> f64 {
-        let a2 = self.alpha * self.alpha;
-        // (cos²(a² − 1) + 1) as cos²a² + sin²: no cancellation near the normal.
-        let sin2 = h.x * h.x + h.y * h.y;
-        let k = h.z * h.z * a2 + sin2;
+        // Multiplied by both widths: no cancellation near the normal, no division by a width.
+        let a2 = self.x * self.y;
+        let (sx, sy) = (h.x * self.y, h.y * self.x);
+        let k = h.z * h.z * a2 + (sx * sx + sy * sy) / a2;
         a2 / (PI * k * k)
     }
 
@@ -31,8 +38,8 @@ impl Ggx {
         if cos2 == 0.0 {
             return f64::INFINITY;
         }
-        let tan2 = (w.x * w.x + w.y * w.y) / cos2;
-        0.5 * ((1.0 + self.alpha * self.alpha * tan2).sqrt() - 1.0)
+        let (sx, sy) = (w.x * self.x, w.y * self.y);
+        0.5 * ((1.0 + (sx * sx + sy * sy) / cos2).sqrt() - 1.0)
     }
 
     /// Masking of one direction.
@@ -50,12 +57,12 @@ impl Ggx {
     /// A microfacet normal visible from `wo` (`wo.z > 0`); density [`visible_pdf`](Self::visible_pdf).
     #[inline]
     pub(super) fn sample_visible(&self, wo: DVec3, u: [f64; 2]) -> DVec3 {
-        let v = DVec3::new(self.alpha * wo.x, self.alpha * wo.y, wo.z).normalize();
+        let v = DVec3::new(self.x * wo.x, self.y * wo.y, wo.z).normalize();
         let (s, c) = (2.0 * PI * u[0]).sin_cos();
         let z = 1.0 - u[1] * (1.0 + v.z);
         let r = (1.0 - z * z).max(0.0).sqrt();
         let h = DVec3::new(r * c, r * s, z) + v;
-        DVec3::new(self.alpha * h.x, self.alpha * h.y, h.z.max(1e-12)).normalize()
+        DVec3::new(self.x * h.x, self.y * h.y, h.z.max(1e-12)).normalize()
     }
 
     /// Density of visible normals in solid angle around `h`.

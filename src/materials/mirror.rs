@@ -13,7 +13,7 @@ impl Material for Mirror {
     #[inline]
     fn scatter(&self, _at: &Surface<'_>, bsdf: &mut Bsdf) {
         bsdf.push(SmoothReflection {
-            fresnel: self.fresnel,
+            fresnel: self.fresnel.into(),
         });
     }
 
@@ -38,6 +38,6 @@ fn build(d: &MaterialDesc) -> Result<Box<dyn Material>, String> {
 pub(super) const ENTRY: MaterialEntry = MaterialEntry {
     name: "mirror",
     doc: "a perfectly smooth metal, with Schlick's Fresnel term on its colour",
-    claims: |d| d.metallic == 1.0 && d.is_smooth(),
+    claims: |d| d.is_plain() && d.metallic == 1.0 && d.is_smooth(),
     build,
 };

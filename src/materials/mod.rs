@@ -8,10 +8,15 @@
 //! `z` axis is the shading normal on the side of `wo`.
 
 mod bsdf;
+mod cover;
 mod desc;
 pub mod fresnel;
+mod layer;
 pub mod lobes;
 mod microfacet;
+mod slots;
+mod thin_film;
+mod values;
 
 mod conductor;
 mod dielectric;
@@ -19,9 +24,11 @@ mod lambert;
 mod mirror;
 mod pbr;
 
-pub use bsdf::{Bsdf, BsdfSample, BsdfValue, TransportMode};
-pub use desc::{Interior, MaterialDesc, MaterialTraits};
+pub use bsdf::{Bsdf, BsdfSample, BsdfValue, FrameId, TransportMode};
+pub use desc::{AlphaMode, Interior, MaterialDesc, MaterialTraits};
 pub use lobes::{CustomLobe, Lobe, LobeClass, LobeModel, LobeSample};
+pub use slots::TextureSlots;
+pub use thin_film::ThinFilm;
 
 use crate::geometry::Surface;
 

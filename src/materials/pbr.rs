@@ -1,52 +1,60 @@
 //! `pbr`: glTF's metallic-roughness material in general: a metal and a dielectric mixed, the
-//! dielectric a diffuse or transmitting base under a reflecting layer (glTF 2.0, appendix B).
+//! dielectric a diffuse or transmitting base under a reflecting layer, then sheen and clear coat
+//! (glTF 2.0, appendix B, and the `KHR_materials` extensions), each value a factor times a
+//! texture.
 
-use super::dielectric::Interface;
-use super::fresnel::Schlick;
-use super::lobes::{CoatedLambert, GgxReflection, Lobe, SmoothReflection};
+use std::sync::Arc;
+
+use super::bsdf::FrameId;
+use super::slots::TextureSlots;
+use super::values::{Values, interior};
 use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
 use crate::geometry::Surface;
 
 struct Pbr {
-    diffuse: Rgb,
-    layer: Schlick,
-    /// The reflection of metal and dielectric together: Schlick's term is linear in f0 and f90.
-    reflection: Schlick,
-    alpha: f64,
-    smooth: bool,
-    interface: Option<Interface>,
+    values: Values,
+    textures: Option<Arc<TextureSlots>>,
+    vertex_colors: bool,
     interior: Option<Interior>,
 }
 
 impl Material for Pbr {
-    #[inline]
     fn scatter(&self, at: &Surface<'_>, bsdf: &mut Bsdf) {
-        bsdf.push(CoatedLambert {
-            albedo: self.diffuse,
-            layer: self.layer,
-        });
-        let lobe: Lobe = if self.smooth {
-            SmoothReflection {
-                fresnel: self.reflection,
-            }
-            .into()
-        } else {
-            GgxReflection::new(self.alpha, self.reflection).into()
-        };
-        bsdf.push(lobe);
-        if let Some(interface) = &self.interface {
-            bsdf.push(interface.lobe(at.sp.front));
+        let mut colored;
+        let mut values = &self.values;
+        let mut coat = FrameId::MAIN;
+        let mut tangent_set = 0;
+        if self.vertex_colors {
+            let [r, g, b, _] = at.color();
+            colored = self.values;
+            colored.base_color *= Rgb::new(r, g, b);
+            values = &colored;
         }
+        if let Some(textures) = &self.textures {
+            colored = textures.evaluate(values, at);
+            values = &colored;
+            tangent_set = textures.tangent_set();
+            let shading = textures.normal(at);
+            if values.clearcoat > 0.0 && (shading.is_some() || textures.clearcoat_normal.is_some())
+            {
+                coat = bsdf.add_frame(textures.clearcoat_normal(at).unwrap_or(at.sp.n));
+            }
+            if let Some(n) = shading {
+                bsdf.set_normal(n);
+            }
+        }
+        if values.anisotropy > 0.0
+            && let Some([t, b]) = at.tangents(tangent_set)
+        {
+            let (s, c) = values.anisotropy_rotation.sin_cos();
+            bsdf.set_tangent(t * c + b * s);
+        }
+        values.stack(at.sp.front, coat, bsdf);
     }
 
     fn traits(&self) -> MaterialTraits {
-        MaterialTraits {
-            diffuse: self.diffuse.max_channel(),
-            reflects: self.reflection.f0.max_channel() > 0.0 || self.reflection.f90 > 0.0,
-            transmits: self.interface.is_some(),
-            refracts: self.interface.is_some_and(|i| i.refracts()),
-        }
+        self.values.traits()
     }
 
     fn interior(&self) -> Option<Interior> {
@@ -55,46 +63,24 @@ impl Material for Pbr {
 }
 
 fn build(d: &MaterialDesc) -> Result<Box<dyn Material>, String> {
-    let transmits = d.transmission > 0.0 && d.metallic < 1.0;
-    let interface = if transmits {
-        Some(Interface::new(d)?)
-    } else {
-        None
-    };
-    // KHR_materials_ior: an index of 0 means a reflectance of 1 at all angles.
-    let r = if d.ior == 0.0 {
-        1.0
-    } else {
-        ((d.ior - 1.0) / (d.ior + 1.0)).powi(2)
-    };
-    let f0 = (d.specular_color * r).map(|c| c.min(1.0)) * d.specular;
-    let dielectric = 1.0 - d.metallic;
-    // Where the base transmits, its interface reflects by exact Fresnel terms; the layer covers
-    // the rest.
-    let opaque = dielectric * (1.0 - d.transmission);
-    let layer = Schlick {
-        f0,
-        f90: d.specular,
-    };
-    let weight = if transmits { opaque } else { dielectric };
+    if d.transmission > 0.0 && d.metallic < 1.0 && !(d.ior >= 1.0) {
+        return Err(format!(
+            "ior {} is below 1; a transmitting material needs 1 or more",
+            d.ior
+        ));
+    }
     Ok(Box::new(Pbr {
-        diffuse: d.base_color * opaque,
-        layer,
-        reflection: Schlick {
-            f0: d.base_color * d.metallic + layer.f0 * weight,
-            f90: d.metallic + layer.f90 * weight,
-        },
-        alpha: d.roughness.max(MaterialDesc::SMOOTH).powi(2),
-        smooth: d.is_smooth(),
-        interface,
-        interior: d.interior(),
+        values: d.into(),
+        textures: d.textures.clone(),
+        vertex_colors: d.vertex_colors,
+        interior: interior(d),
     }))
 }
 
 /// The registry's line.
 pub(super) const ENTRY: MaterialEntry = MaterialEntry {
     name: "pbr",
-    doc: "glTF metallic-roughness: metal and coated dielectric mixed",
+    doc: "glTF metallic-roughness with all its layers and textures",
     claims: |_| true,
     build,
 };

@@ -29,6 +29,17 @@ impl Frame {
         }
     }
 
+    /// The frame around the unit vector `n` whose first axis follows `t`; `None` if they are
+    /// parallel.
+    pub fn from_normal_and_tangent(n: DVec3, t: DVec3) -> Option<Self> {
+        let x = (t - n * n.dot(t)).try_normalize()?;
+        Some(Self {
+            x,
+            y: n.cross(x),
+            z: n,
+        })
+    }
+
     /// World direction of a direction given in the frame.
     #[inline]
     pub fn to_world(&self, v: DVec3) -> DVec3 {

@@ -124,6 +124,82 @@ pub fn specimens(roughnesses: &[f64]) -> Vec<Specimen> {
                     add(&format!("plastic, roughness {r}"), false, plastic);
                     add(&format!("half metal, roughness {r}"), false, mixed);
                     add(&format!("half glass, roughness {r}"), true, milk);
+                    let plastic = || MaterialDesc {
+                        metallic: 0.0,
+                        ..base(r)
+                    };
+                    let layers = [
+                        (
+                            "coated",
+                            MaterialDesc {
+                                clearcoat: 0.9,
+                                clearcoat_roughness: 0.2,
+                                ..plastic()
+                            },
+                        ),
+                        (
+                            "coated metal",
+                            MaterialDesc {
+                                clearcoat: 1.0,
+                                clearcoat_roughness: 0.0,
+                                ..base(r)
+                            },
+                        ),
+                        (
+                            "velvet",
+                            MaterialDesc {
+                                sheen_color: Rgb::new(1.0, 0.6, 0.3),
+                                sheen_roughness: r,
+                                ..plastic()
+                            },
+                        ),
+                        (
+                            "brushed metal",
+                            MaterialDesc {
+                                anisotropy: 0.8,
+                                ..base(r)
+                            },
+                        ),
+                        (
+                            "soap",
+                            MaterialDesc {
+                                iridescence: 1.0,
+                                iridescence_ior: 1.4,
+                                ..plastic()
+                            },
+                        ),
+                        (
+                            "specular and glossiness",
+                            MaterialDesc {
+                                specular_reflectance: Some(Rgb::new(0.5, 0.4, 0.3)),
+                                ..plastic()
+                            },
+                        ),
+                    ];
+                    for (what, desc) in layers {
+                        add(&format!("{what}, roughness {r}"), false, desc);
+                    }
+                    let through = [
+                        (
+                            "leaf",
+                            MaterialDesc {
+                                diffuse_transmission: 0.4,
+                                diffuse_transmission_color: Rgb::new(0.3, 1.0, 0.2),
+                                ..plastic()
+                            },
+                        ),
+                        (
+                            "frosted pane",
+                            MaterialDesc {
+                                transmission: 1.0,
+                                specular: 0.5,
+                                ..plastic()
+                            },
+                        ),
+                    ];
+                    for (what, desc) in through {
+                        add(&format!("{what}, roughness {r}"), true, desc);
+                    }
                 }
             }
         }

@@ -1,31 +1,42 @@
 //! Diffuse reflection below a reflecting layer.
 //!
-//! Source: glTF 2.0, appendix B.3.5 (`fresnel_mix`): the layer takes `F(wo·h)` of the light.
+//! glTF 2.0, B.3.5 (`fresnel_mix`) scales the base by `1 − F(wo·h)`, which gives back up to 1.7
+//! times the light at grazing angles, since the layer above reflects by the angle to its normal.
+//! Here the base keeps what the layer's directional albedo `E` leaves, on the way in and on the
+//! way out: reciprocal, and a white base under a lossless layer returns all light (Ashikhmin and
+//! Shirley, *An Anisotropic Phong BRDF Model*, 2000, generalised by Kelemen and Szirmay-Kalos,
+//! 2001).
 
 use std::f64::consts::FRAC_1_PI;
 
 use super::{LobeClass, LobeModel, LobeSample};
 use crate::color::Rgb;
-use crate::materials::fresnel::Schlick;
+use crate::materials::layer::LayerAlbedo;
 use crate::math::DVec3;
 use crate::sampling::warp;
 
-/// `f = albedo / π · (1 − max F(wo·h))`; reciprocal.
+/// `f = albedo / π · (1 − E(wo)) (1 − E(wi)) / (1 − Ē)`.
 #[derive(Clone, Copy, Debug)]
 pub struct CoatedLambert {
-    /// Reflectance of the base.
-    pub albedo: Rgb,
-    /// Fresnel term of the layer above.
-    pub layer: Schlick,
+    albedo: Rgb,
+    layer: LayerAlbedo,
+    scale: f64,
 }
 
 impl CoatedLambert {
+    /// A base of reflectance `albedo` under a layer.
     #[inline]
-    fn scale(&self, wo: DVec3, wi: DVec3) -> f64 {
-        let Some(h) = (wo + wi).try_normalize() else {
-            return 0.0;
-        };
-        (1.0 - self.layer.at(wo.dot(h).abs()).max_channel()).max(0.0)
+    pub(in crate::materials) fn new(albedo: Rgb, layer: LayerAlbedo) -> Self {
+        Self {
+            albedo,
+            layer,
+            scale: 1.0 / (1.0 - layer.mean()).max(1e-3),
+        }
+    }
+
+    #[inline]
+    fn passes(&self, wo: DVec3, wi: DVec3) -> f64 {
+        (1.0 - self.layer.at(wo.z)) * (1.0 - self.layer.at(wi.z)) * self.scale
     }
 }
 
@@ -40,7 +51,7 @@ impl LobeModel for CoatedLambert {
         if wi.z <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        let f = self.albedo * (FRAC_1_PI * self.scale(wo, wi));
+        let f = self.albedo * (FRAC_1_PI * self.passes(wo, wi));
         (f, warp::cosine_hemisphere_pdf(wi.z))
     }
 
@@ -49,14 +60,13 @@ impl LobeModel for CoatedLambert {
         let wi = warp::cosine_hemisphere(u);
         Some(LobeSample {
             wi,
-            weight: self.albedo * self.scale(wo, wi),
+            weight: self.albedo * self.passes(wo, wi),
             pdf: warp::cosine_hemisphere_pdf(wi.z),
         })
     }
 
     #[inline]
-    fn albedo(&self, _wo: DVec3) -> Rgb {
-        // Reflectance at normal incidence stands for the mean over directions.
-        self.albedo * (1.0 - self.layer.f0.max_channel()).max(0.0)
+    fn albedo(&self, wo: DVec3) -> Rgb {
+        self.albedo * (1.0 - self.layer.at(wo.z))
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Source: Walter et al. 2007, section 4.2, with exact Fresnel terms at the microfacet.
 
-use super::{LobeClass, LobeModel, LobeSample};
+use super::{LobeClass, LobeModel, LobeSample, SmoothDielectric};
 use crate::color::Rgb;
 use crate::materials::fresnel;
 use crate::materials::microfacet::Ggx;
@@ -11,31 +11,32 @@ use crate::math::DVec3;
 /// A rough interface between two dielectrics.
 #[derive(Clone, Copy, Debug)]
 pub struct GgxDielectric {
-    ggx: Ggx,
-    eta: f64,
-    tint: Rgb,
-    share: f64,
+    pub(in crate::materials) ggx: Ggx,
+    /// What a microfacet does.
+    pub(in crate::materials) facet: SmoothDielectric,
+}
+
+/// What a microfacet does with light.
+struct Facet {
+    /// Probability of reflecting.
+    p_reflect: f64,
+    reflected: Rgb,
+    refracted: Rgb,
+    cos_t: f64,
 }
 
 impl GgxDielectric {
-    /// Width `alpha > 0`; `eta`, `tint` and `share` as in
-    /// [`SmoothDielectric`](super::SmoothDielectric).
     #[inline]
-    pub fn new(alpha: f64, eta: f64, tint: Rgb, share: f64) -> Self {
-        Self {
-            ggx: Ggx { alpha },
-            eta,
-            tint,
-            share,
+    fn facet(&self, cos: f64) -> Facet {
+        let f = fresnel::dielectric(cos, self.facet.eta);
+        let [reflected, refracted] = self.facet.split(&f);
+        let (r, t) = (reflected.max_channel(), refracted.max_channel());
+        Facet {
+            p_reflect: if r > 0.0 { r / (r + t) } else { 0.0 },
+            reflected,
+            refracted,
+            cos_t: f.cos_t,
         }
-    }
-
-    /// Probability of reflecting, and the sum of what is reflected and transmitted, at a
-    /// microfacet.
-    #[inline]
-    fn split(&self, cos: f64) -> (f64, f64, fresnel::Dielectric) {
-        let f = fresnel::dielectric(cos, self.eta);
-        (f.reflectance, self.share, f)
     }
 }
 
@@ -50,14 +51,13 @@ impl LobeModel for GgxDielectric {
         if wi.z > 0.0 {
             let h = (wo + wi).normalize();
             let cos_h = wo.dot(h);
-            let (p_reflect, _, f) = self.split(cos_h);
-            let value = self.ggx.d(h) * self.ggx.g2(wo, wi) * f.reflectance * self.share
-                / (4.0 * wo.z * wi.z);
-            let pdf = self.ggx.visible_pdf(wo, h) / (4.0 * cos_h) * p_reflect;
-            return (Rgb::splat(value), pdf);
+            let facet = self.facet(cos_h);
+            let value = self.ggx.d(h) * self.ggx.g2(wo, wi) / (4.0 * wo.z * wi.z);
+            let pdf = self.ggx.visible_pdf(wo, h) / (4.0 * cos_h) * facet.p_reflect;
+            return (facet.reflected * value, pdf);
         }
         // The generalised half vector of refraction, turned to the outer side.
-        let Some(h) = (wo + wi * self.eta).try_normalize() else {
+        let Some(h) = (wo + wi * self.facet.eta).try_normalize() else {
             return none;
         };
         let h = if h.z < 0.0 { -h } else { h };
@@ -65,14 +65,12 @@ impl LobeModel for GgxDielectric {
         if oh <= 0.0 || ih >= 0.0 || wi.z == 0.0 {
             return none;
         }
-        let (p_reflect, _, f) = self.split(oh);
-        let denom = ih + oh / self.eta;
+        let facet = self.facet(oh);
+        let denom = ih + oh / self.facet.eta;
         let jacobian = ih.abs() / (denom * denom);
-        let through = f.transmittance * self.share;
-        let value =
-            self.ggx.d(h) * self.ggx.g2(wo, wi) * through * jacobian * oh / (wo.z * wi.z.abs());
-        let pdf = self.ggx.visible_pdf(wo, h) * jacobian * (1.0 - p_reflect);
-        (self.tint * value, pdf)
+        let value = self.ggx.d(h) * self.ggx.g2(wo, wi) * jacobian * oh / (wo.z * wi.z.abs());
+        let pdf = self.ggx.visible_pdf(wo, h) * jacobian * (1.0 - facet.p_reflect);
+        (facet.refracted * value, pdf)
     }
 
     fn sample(&self, wo: DVec3, u_pick: f64, u: [f64; 2]) -> Option<LobeSample> {
@@ -81,35 +79,38 @@ impl LobeModel for GgxDielectric {
         if oh <= 0.0 {
             return None;
         }
-        let (p_reflect, sum, f) = self.split(oh);
-        let reflect = u_pick < p_reflect;
+        let facet = self.facet(oh);
+        let reflect = u_pick < facet.p_reflect;
         let wi = if reflect {
             h * (2.0 * oh) - wo
         } else {
-            let inv = 1.0 / self.eta;
-            (h * (oh * inv - f.cos_t) - wo * inv).normalize()
+            let inv = 1.0 / self.facet.eta;
+            (h * (oh * inv - facet.cos_t) - wo * inv).normalize()
         };
         if (wi.z > 0.0) != reflect || wi.z == 0.0 {
             return None;
         }
         let shadow = self.ggx.g2(wo, wi) / self.ggx.g1(wo);
-        let color = if reflect { Rgb::ONE } else { self.tint };
+        let color = if reflect {
+            facet.reflected / facet.p_reflect
+        } else {
+            facet.refracted / (1.0 - facet.p_reflect)
+        };
         let (_, pdf) = self.eval(wo, wi);
         Some(LobeSample {
             wi,
-            weight: color * (sum * shadow),
+            weight: color * shadow,
             pdf,
         })
     }
 
     #[inline]
     fn albedo(&self, wo: DVec3) -> Rgb {
-        let (_, _, f) = self.split(wo.z);
-        (Rgb::splat(f.reflectance) + self.tint * f.transmittance) * self.share
+        self.facet.albedo(wo)
     }
 
     #[inline]
     fn eta(&self) -> f64 {
-        self.eta
+        self.facet.eta
     }
 }

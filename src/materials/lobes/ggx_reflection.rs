@@ -2,24 +2,24 @@
 
 use super::{LobeClass, LobeModel, LobeSample};
 use crate::color::Rgb;
-use crate::materials::fresnel::Schlick;
+use crate::materials::fresnel::Fresnel;
 use crate::materials::microfacet::Ggx;
 use crate::math::DVec3;
 
-/// GGX reflection with a Schlick Fresnel term, sampled by visible normals.
+/// GGX reflection, sampled by visible normals.
 #[derive(Clone, Copy, Debug)]
 pub struct GgxReflection {
-    ggx: Ggx,
-    fresnel: Schlick,
+    pub(in crate::materials) ggx: Ggx,
+    pub(in crate::materials) fresnel: Fresnel,
 }
 
 impl GgxReflection {
-    /// Reflection of microfacet width `alpha > 0`.
+    /// Reflection of microfacet width `alpha > 0`, the same in all directions.
     #[inline]
-    pub fn new(alpha: f64, fresnel: Schlick) -> Self {
+    pub fn new(alpha: f64, fresnel: impl Into<Fresnel>) -> Self {
         Self {
-            ggx: Ggx { alpha },
-            fresnel,
+            ggx: Ggx::round(alpha),
+            fresnel: fresnel.into(),
         }
     }
 }

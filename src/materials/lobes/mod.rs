@@ -5,22 +5,28 @@
 //! `wo.z > 0` always; `wi.z < 0` means transmission.
 
 mod coated_lambert;
+mod diffuse_transmission;
 mod ggx_dielectric;
 mod ggx_reflection;
 mod lambert;
+mod sheen;
 mod smooth_dielectric;
 mod smooth_reflection;
 mod thin_dielectric;
+mod thin_ggx;
 
 use std::sync::Arc;
 
 pub use coated_lambert::CoatedLambert;
+pub use diffuse_transmission::DiffuseTransmission;
 pub use ggx_dielectric::GgxDielectric;
 pub use ggx_reflection::GgxReflection;
 pub use lambert::Lambert;
+pub use sheen::Sheen;
 pub use smooth_dielectric::SmoothDielectric;
 pub use smooth_reflection::SmoothReflection;
 pub use thin_dielectric::ThinDielectric;
+pub use thin_ggx::ThinGgx;
 
 use crate::color::Rgb;
 use crate::math::DVec3;
@@ -168,9 +174,12 @@ macro_rules! lobes {
 lobes! {
     Lambert(Lambert),
     CoatedLambert(CoatedLambert),
+    DiffuseTransmission(DiffuseTransmission),
+    Sheen(Sheen),
     SmoothReflection(SmoothReflection),
     SmoothDielectric(SmoothDielectric),
     ThinDielectric(ThinDielectric),
+    ThinGgx(ThinGgx),
     GgxReflection(GgxReflection),
     GgxDielectric(GgxDielectric),
     Custom(CustomLobe),

@@ -12,8 +12,18 @@ pub struct SmoothDielectric {
     pub eta: f64,
     /// Colour of what is refracted.
     pub tint: Rgb,
-    /// Share of the surface that is this interface; the rest is left to other lobes.
-    pub share: f64,
+    /// Colour of what is reflected, where not everything is; what it leaves is refracted.
+    pub reflect: Rgb,
+    /// Share of the surface that is this interface, by channel; the rest is left to other lobes.
+    pub share: Rgb,
+}
+
+impl SmoothDielectric {
+    /// What is reflected and refracted.
+    #[inline]
+    pub(super) fn split(&self, f: &fresnel::Dielectric) -> [Rgb; 2] {
+        fresnel::split(f, self.reflect, self.tint).map(|c| c * self.share)
+    }
 }
 
 impl LobeModel for SmoothDielectric {
@@ -35,18 +45,18 @@ impl LobeModel for SmoothDielectric {
     #[inline]
     fn branches(&self, wo: DVec3) -> Branches {
         let f = fresnel::dielectric(wo.z, self.eta);
+        let [reflected, refracted] = self.split(&f);
         let mut out = Branches::new();
         out.push(LobeSample {
             wi: DVec3::new(-wo.x, -wo.y, wo.z),
-            weight: Rgb::splat(f.reflectance * self.share),
+            weight: reflected,
             pdf: 0.0,
         });
-        let through = f.transmittance * self.share;
-        if through > 0.0 {
+        if !refracted.is_black() {
             let inv = 1.0 / self.eta;
             out.push(LobeSample {
                 wi: DVec3::new(-wo.x * inv, -wo.y * inv, -f.cos_t).normalize(),
-                weight: self.tint * through,
+                weight: refracted,
                 pdf: 0.0,
             });
         }
@@ -55,8 +65,8 @@ impl LobeModel for SmoothDielectric {
 
     #[inline]
     fn albedo(&self, wo: DVec3) -> Rgb {
-        let f = fresnel::dielectric(wo.z, self.eta);
-        (Rgb::splat(f.reflectance) + self.tint * f.transmittance) * self.share
+        let [reflected, refracted] = self.split(&fresnel::dielectric(wo.z, self.eta));
+        reflected + refracted
     }
 
     #[inline]

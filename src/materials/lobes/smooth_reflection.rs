@@ -2,14 +2,14 @@
 
 use super::{Branches, LobeClass, LobeModel, LobeSample};
 use crate::color::Rgb;
-use crate::materials::fresnel::Schlick;
+use crate::materials::fresnel::Fresnel;
 use crate::math::DVec3;
 
-/// Reflection by a perfectly smooth surface with a Schlick Fresnel term.
+/// Reflection by a perfectly smooth surface .
 #[derive(Clone, Copy, Debug)]
 pub struct SmoothReflection {
     /// Reflectance by angle.
-    pub fresnel: Schlick,
+    pub fresnel: Fresnel,
 }
 
 impl LobeModel for SmoothReflection {

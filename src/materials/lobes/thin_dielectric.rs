@@ -13,19 +13,24 @@ pub struct ThinDielectric {
     pub eta: f64,
     /// Colour of what passes.
     pub tint: Rgb,
+    /// Colour of what is reflected, where not everything is; what it leaves passes.
+    pub reflect: Rgb,
     /// Share of the surface that is this pane; the rest is left to other lobes.
-    pub share: f64,
+    pub share: Rgb,
 }
 
 impl ThinDielectric {
+    /// What is reflected and what passes.
     #[inline]
-    fn split(&self, cos: f64) -> (f64, f64) {
+    pub(super) fn split(&self, cos: f64) -> [Rgb; 2] {
         let f = fresnel::dielectric(cos, self.eta);
         let sum = 1.0 + f.reflectance;
-        (
-            2.0 * f.reflectance / sum * self.share,
-            f.transmittance / sum * self.share,
-        )
+        let pane = fresnel::Dielectric {
+            reflectance: 2.0 * f.reflectance / sum,
+            transmittance: f.transmittance / sum,
+            cos_t: 1.0,
+        };
+        fresnel::split(&pane, self.reflect, self.tint).map(|c| c * self.share)
     }
 }
 
@@ -47,16 +52,16 @@ impl LobeModel for ThinDielectric {
 
     #[inline]
     fn branches(&self, wo: DVec3) -> Branches {
-        let (r, t) = self.split(wo.z);
+        let [r, t] = self.split(wo.z);
         Branches::from_iter([
             LobeSample {
                 wi: DVec3::new(-wo.x, -wo.y, wo.z),
-                weight: Rgb::splat(r),
+                weight: r,
                 pdf: 0.0,
             },
             LobeSample {
                 wi: -wo,
-                weight: self.tint * t,
+                weight: t,
                 pdf: 0.0,
             },
         ])
@@ -64,7 +69,7 @@ impl LobeModel for ThinDielectric {
 
     #[inline]
     fn albedo(&self, wo: DVec3) -> Rgb {
-        let (r, t) = self.split(wo.z);
-        Rgb::splat(r) + self.tint * t
+        let [r, t] = self.split(wo.z);
+        r + t
     }
 }

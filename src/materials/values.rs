@@ -1,0 +1,237 @@
+//! The numbers of a glTF material at one point, and the lobes they make.
+
+use super::Bsdf;
+use super::bsdf::FrameId;
+use super::cover::Cover;
+use super::dielectric::Interface;
+use super::fresnel::{Fresnel, Schlick};
+use super::layer::LayerAlbedo;
+use super::lobes::{
+    CoatedLambert, DiffuseTransmission, GgxReflection, Lambert, Lobe, Sheen, SmoothReflection,
+};
+use super::microfacet::Ggx;
+use super::thin_film::ThinFilm;
+use super::{Interior, MaterialDesc, MaterialTraits};
+use crate::color::Rgb;
+
+/// Index of refraction of the clear coat (`KHR_materials_clearcoat`).
+const COAT_IOR: f64 = 1.5;
+
+/// What textures can change, and what goes with it; named as in [`MaterialDesc`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Values {
+    pub(super) base_color: Rgb,
+    pub(super) metallic: f64,
+    pub(super) roughness: f64,
+    pub(super) ior: f64,
+    pub(super) specular: f64,
+    pub(super) specular_color: Rgb,
+    pub(super) specular_reflectance: Option<Rgb>,
+    pub(super) transmission: f64,
+    pub(super) volume: bool,
+    pub(super) dispersion: f64,
+    pub(super) diffuse_transmission: f64,
+    pub(super) diffuse_transmission_color: Rgb,
+    pub(super) clearcoat: f64,
+    pub(super) clearcoat_roughness: f64,
+    pub(super) sheen_color: Rgb,
+    pub(super) sheen_roughness: f64,
+    pub(super) anisotropy: f64,
+    pub(super) anisotropy_rotation: f64,
+    pub(super) iridescence: f64,
+    pub(super) iridescence_ior: f64,
+    pub(super) iridescence_range: [f64; 2],
+    pub(super) iridescence_thickness: f64,
+}
+
+impl From<&MaterialDesc> for Values {
+    fn from(d: &MaterialDesc) -> Self {
+        Self {
+            base_color: d.base_color,
+            metallic: d.metallic,
+            roughness: d.roughness,
+            ior: d.ior,
+            specular: d.specular,
+            specular_color: d.specular_color,
+            specular_reflectance: d.specular_reflectance,
+            transmission: d.transmission,
+            volume: d.volume,
+            dispersion: d.dispersion,
+            diffuse_transmission: d.diffuse_transmission,
+            diffuse_transmission_color: d.diffuse_transmission_color,
+            clearcoat: d.clearcoat,
+            clearcoat_roughness: d.clearcoat_roughness,
+            sheen_color: d.sheen_color,
+            sheen_roughness: d.sheen_roughness,
+            anisotropy: d.anisotropy,
+            anisotropy_rotation: d.anisotropy_rotation,
+            iridescence: d.iridescence,
+            iridescence_ior: d.iridescence_ior,
+            iridescence_range: d.iridescence_thickness,
+            iridescence_thickness: d.iridescence_thickness[1],
+        }
+    }
+}
+
+impl Values {
+    /// Reflectance at normal and at grazing incidence of the dielectric (glTF 2.0, B.3.5;
+    /// `KHR_materials_specular`).
+    fn dielectric_layer(&self) -> Schlick {
+        if let Some(f0) = self.specular_reflectance {
+            return Schlick { f0, f90: 1.0 };
+        }
+        // KHR_materials_ior: an index of 0 means a reflectance of 1 at all angles.
+        let r = if self.ior == 0.0 {
+            1.0
+        } else {
+            ((self.ior - 1.0) / (self.ior + 1.0)).powi(2)
+        };
+        Schlick {
+            f0: (self.specular_color * r).map(|c| c.min(1.0)) * self.specular,
+            f90: self.specular,
+        }
+    }
+
+    fn interface(&self, share: f64) -> Interface {
+        Interface {
+            ior: self.ior,
+            dispersion: self.dispersion,
+            tint: self.base_color,
+            reflect: self.specular_color * self.specular,
+            share,
+            ggx: self.ggx(),
+            // Index 1 bends nothing, however rough: a delta that light sampling leaves alone.
+            smooth: self.is_smooth() || (self.ior == 1.0 && self.volume),
+            thin: !self.volume,
+        }
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.roughness < MaterialDesc::SMOOTH
+    }
+
+    /// The microfacet distribution (`KHR_materials_anisotropy` widens it along the tangent).
+    fn ggx(&self) -> Ggx {
+        let alpha = self.roughness.max(MaterialDesc::SMOOTH).powi(2);
+        let along = alpha + (1.0 - alpha) * self.anisotropy * self.anisotropy;
+        Ggx { x: along, y: alpha }
+    }
+
+    /// Pushes the lobes, from the base outward, in the main frame of `bsdf`; the clear coat lies
+    /// in the frame `coat`.
+    #[inline]
+    pub(super) fn stack(&self, front: bool, coat: FrameId, bsdf: &mut Bsdf) {
+        let dielectric = 1.0 - self.metallic;
+        let through = dielectric * self.transmission;
+        let opaque = dielectric - through;
+        let layer = self.dielectric_layer();
+        let film = (self.iridescence > 0.0).then(|| ThinFilm {
+            ior: self.iridescence_ior,
+            thickness: self.iridescence_thickness,
+        });
+
+        if opaque > 0.0 {
+            let mut base = self.base_color * opaque;
+            if let Some(f0) = self.specular_reflectance {
+                base *= 1.0 - f0.max_channel().min(1.0);
+            }
+            let passing = base * self.diffuse_transmission;
+            let staying = base * (1.0 - self.diffuse_transmission);
+            if layer.f0.is_black() && layer.f90 == 0.0 && film.is_none() {
+                bsdf.push(Lambert { albedo: staying });
+            } else {
+                let cover = self.layer_albedo(&layer, film.as_ref());
+                bsdf.push(CoatedLambert::new(staying, cover));
+            }
+            if self.diffuse_transmission > 0.0 {
+                bsdf.push(DiffuseTransmission::new(
+                    passing * self.diffuse_transmission_color,
+                    self.layer_albedo(&layer, film.as_ref()),
+                ));
+            }
+        }
+        if through > 0.0 {
+            self.interface(through).push(front, bsdf);
+        }
+        // Metal and dielectric reflect alike: Schlick's term is linear in f0 and f90.
+        let schlick = Schlick {
+            f0: self.base_color * self.metallic + layer.f0 * opaque,
+            f90: self.metallic + layer.f90 * opaque,
+        };
+        let fresnel = match film {
+            None => Fresnel::Schlick(schlick),
+            Some(film) => {
+                let share = self.metallic + opaque;
+                Fresnel::Film {
+                    base: schlick,
+                    film,
+                    strength: self.iridescence,
+                    share,
+                }
+            }
+        };
+        bsdf.push(reflection(self.is_smooth(), self.ggx(), fresnel));
+
+        if !self.sheen_color.is_black() {
+            let sheen = Sheen::new(self.sheen_color, self.sheen_roughness);
+            bsdf.cover(Cover::sheen(&sheen), FrameId::MAIN);
+            bsdf.push(sheen);
+        }
+        if self.clearcoat > 0.0 {
+            let r = ((COAT_IOR - 1.0) / (COAT_IOR + 1.0)).powi(2);
+            let fresnel = Schlick {
+                f0: Rgb::splat(r * self.clearcoat),
+                f90: self.clearcoat,
+            };
+            let albedo = LayerAlbedo::new(self.clearcoat_roughness, r, 1.0, self.clearcoat);
+            bsdf.cover(Cover::coat(albedo), coat);
+            let alpha = self.clearcoat_roughness.max(MaterialDesc::SMOOTH).powi(2);
+            let smooth = self.clearcoat_roughness < MaterialDesc::SMOOTH;
+            let lobe = reflection(smooth, Ggx::round(alpha), Fresnel::Schlick(fresnel));
+            bsdf.push_in(lobe, coat);
+        }
+    }
+
+    /// What the reflecting layer above the diffuse base sends back, largest channel.
+    fn layer_albedo(&self, layer: &Schlick, film: Option<&ThinFilm>) -> LayerAlbedo {
+        let f0 = match film {
+            None => layer.f0.max_channel(),
+            Some(film) => {
+                let bare = layer.f0.max_channel() * (1.0 - self.iridescence);
+                bare + film.bound(layer.f0) * self.iridescence
+            }
+        };
+        LayerAlbedo::new(self.roughness, f0.min(1.0), layer.f90.max(f0.min(1.0)), 1.0)
+    }
+
+    pub(super) fn traits(&self) -> MaterialTraits {
+        let layer = self.dielectric_layer();
+        let dielectric = 1.0 - self.metallic;
+        let transmits = self.transmission > 0.0 && dielectric > 0.0;
+        MaterialTraits {
+            diffuse: self.base_color.max_channel() * dielectric * (1.0 - self.transmission)
+                + self.sheen_color.max_channel(),
+            reflects: self.metallic > 0.0
+                || layer.f90 > 0.0
+                || !layer.f0.is_black()
+                || self.clearcoat > 0.0
+                || self.iridescence > 0.0
+                || transmits,
+            transmits,
+            refracts: transmits && self.volume && (self.ior != 1.0 || self.dispersion > 0.0),
+        }
+    }
+}
+
+fn reflection(smooth: bool, ggx: Ggx, fresnel: Fresnel) -> Lobe {
+    if smooth {
+        SmoothReflection { fresnel }.into()
+    } else {
+        GgxReflection { ggx, fresnel }.into()
+    }
+}
+
+/// The medium that `d` encloses, if its surface can let light in.
+pub(super) fn interior(d: &MaterialDesc) -> Option<Interior> {
+    d.interior().filter(|_| d.metallic < 1.0)
+}
