@@ -11,10 +11,6 @@ mod json;
 mod material;
 mod mesh;
 mod node;
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "materials take their textures next")
-)]
 mod texture;
 mod used;
 
@@ -42,10 +38,18 @@ pub struct ImportOptions {
 /// Extensions that are honoured; a file may require them.
 const SUPPORTED: &[&str] = &[
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
+    "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
@@ -224,15 +228,20 @@ fn fill<'a>(
     }
     images.decode()?;
     let mut materials = Vec::new();
-    for m in entries {
-        let desc = material::read(&m, images, notes)?;
+    let colored = material::with_vertex_colors(root)?;
+    for (i, m) in entries.iter().enumerate() {
+        let mut desc = material::read(m, images, notes)?;
+        desc.vertex_colors = colored.contains(&Some(i));
         let id = builder
             .add_material(&desc)
             .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
         materials.push(id);
     }
     let default_material = builder
-        .add_material(&MaterialDesc::default())
+        .add_material(&MaterialDesc {
+            vertex_colors: colored.contains(&None),
+            ..Default::default()
+        })
         .map_err(|e| Failure::Plugin("the default material".into(), Box::new(e)))?;
     let mut walker = Walker {
         source,

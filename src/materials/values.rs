@@ -125,7 +125,7 @@ impl Values {
         let through = dielectric * self.transmission;
         let opaque = dielectric - through;
         let layer = self.dielectric_layer();
-        let film = (self.iridescence > 0.0).then(|| ThinFilm {
+        let film = (self.iridescence > 0.0).then_some(ThinFilm {
             ior: self.iridescence_ior,
             thickness: self.iridescence_thickness,
         });
