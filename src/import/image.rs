@@ -15,7 +15,9 @@ use rayon::prelude::*;
 
 use super::accessor::Source;
 use super::json::Cursor;
-use super::{Problem, container};
+#[cfg(feature = "ktx2")]
+use super::ktx2;
+use super::{Notes, Problem, container};
 use crate::textures::{Image, Texels};
 
 /// Most texels of one image: 16384 × 16384.
@@ -25,13 +27,22 @@ const MAX_TEXELS: u64 = 1 << 28;
 /// gigabytes, so the headers are added up before anything is decoded.
 const MAX_BYTES: u64 = 1 << 33;
 
+/// What is known of an image that was asked for.
+#[derive(Clone)]
+enum State {
+    Waiting,
+    Decoded(Arc<Image>),
+    /// It is in a format that is not supported.
+    Foreign,
+}
+
 /// The images of a file.
 pub(super) struct Images<'a> {
     root: Cursor<'a>,
     buffers: &'a [Vec<u8>],
     file: &'a Path,
-    /// Images that were asked for, by index; `None` until [`decode`](Self::decode).
-    wanted: HashMap<usize, Option<Arc<Image>>>,
+    /// Images that were asked for, by index.
+    wanted: HashMap<usize, State>,
     decoded: bool,
     placeholder: Arc<Image>,
 }
@@ -56,15 +67,25 @@ impl<'a> Images<'a> {
 
     /// The image whose index stands at `at`. Before [`decode`](Self::decode) this notes that it
     /// is needed and gives a white texel; so it does after for images that were not asked for
-    /// before.
-    pub(super) fn get(&mut self, at: &Cursor<'a>) -> Result<Arc<Image>, Problem> {
+    /// before. `None`, with a note, if its format is not supported.
+    pub(super) fn get(
+        &mut self,
+        at: &Cursor<'a>,
+        notes: &mut Notes,
+    ) -> Result<Option<Arc<Image>>, Problem> {
         let index = at.index()?;
         self.root.element("images", index, at)?;
         if !self.decoded {
-            self.wanted.entry(index).or_insert(None);
+            self.wanted.entry(index).or_insert(State::Waiting);
         }
-        let image = self.wanted.get(&index).and_then(Option::as_ref);
-        Ok(Arc::clone(image.unwrap_or(&self.placeholder)))
+        Ok(match self.wanted.get(&index) {
+            Some(State::Decoded(image)) => Some(Arc::clone(image)),
+            Some(State::Foreign) => {
+                notes.add(FOREIGN, 1);
+                None
+            }
+            _ => Some(Arc::clone(&self.placeholder)),
+        })
     }
 
     /// Reads and decodes, in parallel, what was asked for.
@@ -92,21 +113,23 @@ impl<'a> Images<'a> {
             }
         }
         let budget = AtomicU64::new(MAX_BYTES);
-        let results: Vec<(usize, Result<Image, Problem>)> = tasks
+        let results: Vec<(usize, Result<Option<Image>, Problem>)> = tasks
             .par_iter()
             .map(|(index, image)| (*index, self.load(image, &budget)))
             .collect();
         for (index, image) in results {
-            self.wanted.insert(index, Some(Arc::new(image?)));
+            let state = image?.map_or(State::Foreign, |i| State::Decoded(Arc::new(i)));
+            self.wanted.insert(index, state);
         }
         for (index, original) in same {
-            let image = self.wanted.get(&original).cloned().flatten();
-            self.wanted.insert(index, image);
+            if let Some(state) = self.wanted.get(&original).cloned() {
+                self.wanted.insert(index, state);
+            }
         }
         Ok(())
     }
 
-    fn load(&self, image: &Cursor<'a>, budget: &AtomicU64) -> Result<Image, Problem> {
+    fn load(&self, image: &Cursor<'a>, budget: &AtomicU64) -> Result<Option<Image>, Problem> {
         if let Some(uri) = image.get("uri") {
             return decode(&container::read_uri(&uri, self.file)?, &uri, budget);
         }
@@ -136,18 +159,28 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Decodes the image file `bytes`, found at `place`. Its format is told by its first bytes:
-/// names and MIME types are often wrong. Embedded colour profiles and orientation are ignored,
-/// as glTF 2.0, 3.8.3 demands. The decoded size is taken off `budget`.
+/// What is told of images in other formats.
+const FOREIGN: &str = "images that are not PNG, JPEG, WebP or KTX2 (Basis Universal or plain \
+     texels) are not supported: the factors of their textures alone are used";
+
+/// Decodes the image file `bytes`, found at `place`; `None` if its format is known but not
+/// supported. The format is told by the first bytes: names and MIME types are often wrong.
+/// Embedded colour profiles and orientation are ignored, as glTF 2.0, 3.8.3 demands. The decoded
+/// size is taken off `budget`.
 pub(super) fn decode(
     bytes: &[u8],
     place: &Cursor<'_>,
     budget: &AtomicU64,
-) -> Result<Image, Problem> {
+) -> Result<Option<Image>, Problem> {
+    #[cfg(feature = "ktx2")]
+    if ktx2::recognises(bytes) {
+        return decode_ktx2(bytes, place, budget);
+    }
     let format = match image::guess_format(bytes) {
         Ok(f @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) => f,
-        Ok(other) => return Err(unknown(place, &format!("is a {other:?} image"))),
-        Err(_) => return Err(unknown(place, "is no image of a known format")),
+        Ok(_) => return Ok(None),
+        Err(_) if is_container(bytes) => return Ok(None),
+        Err(_) => return Err(place.problem("is no image of a known format")),
     };
     let broken = |e: ImageError| place.problem(format!("cannot be decoded ({e})"));
     let decoder = ImageReader::with_format(io::Cursor::new(bytes), format)
@@ -168,7 +201,33 @@ pub(super) fn decode(
         other => (4, Texels::U8(other.into_rgba8().into_raw())),
     };
     Image::from_texels(width, height, channels, texels)
+        .map(Some)
         .ok_or_else(|| place.problem(format!("is an image of {width} × {height} texels")))
+}
+
+#[cfg(feature = "ktx2")]
+fn decode_ktx2(
+    bytes: &[u8],
+    place: &Cursor<'_>,
+    budget: &AtomicU64,
+) -> Result<Option<Image>, Problem> {
+    let tell = |fault: ktx2::Fault| match fault {
+        ktx2::Fault::Broken(what) => Err(place.problem(what)),
+        ktx2::Fault::Foreign => Ok(None),
+    };
+    let file = match ktx2::Ktx2::open(bytes) {
+        Ok(file) => file,
+        Err(fault) => return tell(fault),
+    };
+    claim(file.width, file.height, file.decoded_bytes(), place, budget)?;
+    file.decode().map(Some).or_else(tell)
+}
+
+/// Whether the bytes begin as a texture container does that is known by name: KTX, KTX2, Basis.
+fn is_container(bytes: &[u8]) -> bool {
+    [&b"\xABKTX 11\xBB"[..], b"\xABKTX 20\xBB", b"sB\x13\x00"]
+        .iter()
+        .any(|magic| bytes.starts_with(magic))
 }
 
 /// Refuses images that are too large, by what their header says.
@@ -200,12 +259,4 @@ fn claim(
         ));
     }
     Ok(())
-}
-
-fn unknown(place: &Cursor<'_>, what: &str) -> Problem {
-    Problem::unsupported(
-        place.path(),
-        what,
-        "convert it to PNG, JPEG or WebP and export again",
-    )
 }

@@ -8,6 +8,8 @@ mod accessor;
 mod container;
 mod image;
 mod json;
+#[cfg(feature = "ktx2")]
+mod ktx2;
 mod material;
 mod mesh;
 mod node;
@@ -54,6 +56,8 @@ const SUPPORTED: &[&str] = &[
     "KHR_mesh_quantization",
     "KHR_texture_transform",
     "EXT_texture_webp",
+    #[cfg(feature = "ktx2")]
+    "KHR_texture_basisu",
 ];
 
 /// Something is wrong at a place in the file.

@@ -21,12 +21,14 @@ pub(super) fn read<'a>(
     let texture = images.root().element("textures", index.index()?, &index)?;
     let Some(at) = source(&texture) else {
         notes.add(
-            "textures without a PNG, JPEG or WebP image are ignored: their factors alone are used",
+            "textures without an image that could be read are ignored: their factors alone are used",
             1,
         );
         return Ok(None);
     };
-    let image = images.get(&at)?;
+    let Some(image) = images.get(&at, notes)? else {
+        return Ok(None);
+    };
     let sampler = match texture.get("sampler") {
         Some(at) => sampler(&images.root().element("samplers", at.index()?, &at)?)?,
         None => Sampler::default(),
@@ -54,8 +56,9 @@ pub(super) fn read<'a>(
 /// Where the index of the texture's image stands. An extension's image goes before the plain
 /// one, which is there for readers that do not know the extension.
 fn source<'a>(texture: &Cursor<'a>) -> Option<Cursor<'a>> {
-    ["EXT_texture_webp"]
+    ["KHR_texture_basisu", "EXT_texture_webp"]
         .into_iter()
+        .filter(|name| super::SUPPORTED.contains(name))
         .find_map(|name| texture.extension(name)?.get("source"))
         .or_else(|| texture.get("source"))
 }

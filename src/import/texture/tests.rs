@@ -182,10 +182,9 @@ fn broken_foreign_missing_and_huge_images_are_refused_with_their_place() {
     let mut crc = flate2::Crc::new();
     crc.update(&huge[12..29]);
     huge[29..33].copy_from_slice(&crc.sum().to_be_bytes());
-    let cases: [(Vec<u8>, &str); 5] = [
+    let cases: [(Vec<u8>, &str); 4] = [
         (png, "cannot be decoded"),
         (huge, "60000 × 60000"),
-        (b"BM123456789012345678".to_vec(), "Bmp"),
         (b"nothing at all".to_vec(), "no image of a known format"),
         (Vec::new(), "no image of a known format"),
     ];
@@ -194,6 +193,9 @@ fn broken_foreign_missing_and_huge_images_are_refused_with_their_place() {
         assert!(e.problem.contains(expected), "{}", e.problem);
         assert!(e.place.contains("images"), "{}", e.place);
     }
+    // Known, but not in glTF: a note, and no texture.
+    let bmp = document(json!({"uri": uri(b"BM123456789012345678")}));
+    assert!(load(&bmp, &[]).unwrap().is_none());
     let e = load(&document(json!({"uri": "gone.png"})), &[]).unwrap_err();
     assert!(e.problem.contains("gone.png"), "{}", e.problem);
     let e = load(&document(json!({"name": "empty"})), &[]).unwrap_err();
@@ -240,4 +242,64 @@ fn samplers_and_transforms_are_read() {
     }
     json["textures"][0] = json!({"extensions": {"UNKNOWN_texture": {"source": 0}}});
     assert!(load(&json, &[]).unwrap().is_none());
+}
+
+/// A KTX2 file of one level.
+#[cfg(feature = "ktx2")]
+fn ktx2(format: u32, size: [u32; 2], scheme: u32, level: &[u8], unpacked: u64) -> Vec<u8> {
+    let mut out = b"\xABKTX 20\xBB\r\n\x1A\n".to_vec();
+    for x in [format, 1, size[0], size[1], 0, 0, 1, 1, scheme] {
+        out.extend(x.to_le_bytes());
+    }
+    out.resize(80, 0);
+    for x in [104, level.len() as u64, unpacked] {
+        out.extend(x.to_le_bytes());
+    }
+    out.extend(level);
+    out
+}
+
+#[cfg(feature = "ktx2")]
+#[test]
+fn plain_texels_in_ktx2_are_read() {
+    let rgb: Vec<u8> = (0..18).collect();
+    let image = decoded(&ktx2(29, [3, 2], 0, &rgb, 18));
+    assert_eq!((image.width(), image.height(), image.channels()), (3, 2, 3));
+    let t = image.texel(2, 1, Content::Data);
+    assert!((t[0] * 255.0 - 15.0).abs() < 1e-5 && t[3] == 1.0);
+    // Red and green of 16 bits: no blue, and no alpha either.
+    let image = decoded(&ktx2(77, [1, 1], 0, &[1, 2, 3, 4], 4));
+    let t = image.texel(0, 0, Content::Data);
+    assert_eq!(t, [513.0 / 65535.0, 1027.0 / 65535.0, 0.0, 1.0]);
+    // A frame of Zstandard that holds raw bytes.
+    let mut packed = vec![0x28, 0xB5, 0x2F, 0xFD, 0x20, 18, (18 << 3) | 1, 0, 0];
+    packed.extend(&rgb);
+    let image = decoded(&ktx2(23, [3, 2], 2, &packed, 18));
+    let t = image.texel(0, 1, Content::Data);
+    assert!((t[1] * 255.0 - 10.0).abs() < 1e-5);
+}
+
+#[cfg(feature = "ktx2")]
+#[test]
+fn broken_ktx2_is_refused_and_foreign_kinds_are_left_out() {
+    let load = |bytes: &[u8]| load(&document(json!({"uri": uri(bytes)})), &[]);
+    let good = ktx2(29, [3, 2], 0, &[7; 18], 18);
+    for n in (0..8).chain(12..good.len()) {
+        assert!(load(&good[..n]).is_err(), "{n} bytes");
+    }
+    for (at, value) in [(20, 9), (80, 0x7F), (95, 0xFF), (88, 1), (40, 0xFF)] {
+        let mut bad = good.clone();
+        bad[at] = value;
+        assert!(load(&bad).is_err(), "byte {at}");
+    }
+    // Claims memory that its data cannot fill.
+    assert!(load(&ktx2(29, [1 << 14, 1 << 13], 0, &[7; 18], 18)).is_err());
+    assert!(load(&ktx2(0, [4, 4], 2, &[7; 18], 1 << 48)).is_err());
+    for (format, scheme) in [(145, 0), (29, 3), (29, 1)] {
+        assert!(
+            load(&ktx2(format, [3, 2], scheme, &[7; 18], 18))
+                .unwrap()
+                .is_none()
+        );
+    }
 }
