@@ -3,11 +3,13 @@
 //! A geometry is complete when it is made, and never changes afterwards.
 
 use std::ptr::NonNull;
+use std::sync::Arc;
 
 use embree4_sys::{RTCBufferType, RTCFormat, RTCGeometry, RTCGeometryTy, RTCGeometryType};
 
+use super::filter::{self, Filter};
 use super::scene::CommittedScene;
-use super::{Device, EmbreeError, ErrorCode};
+use super::{Device, EmbreeError, ErrorCode, HitFilter};
 
 /// A mesh, a set of spheres or an instance, ready to be attached to scenes.
 #[derive(Debug)]
@@ -15,6 +17,8 @@ pub struct Geometry {
     geometry: NonNull<RTCGeometryTy>,
     /// The scene an instance shows.
     instanced: Option<CommittedScene>,
+    /// Who decides about its hits.
+    filter: Option<Arc<Filter>>,
     /// Dropped last: Embree's device outlives its geometries.
     device: Device,
 }
@@ -37,7 +41,7 @@ impl Drop for Geometry {
 impl Geometry {
     /// A triangle mesh; triangle `i` is primitive `i`.
     ///
-    /// Both slices are copied. Triangles with a vertex that is not finite, or as large as
+    /// `filter` decides about its hits, if there is one. Both slices are copied. Triangles with a vertex that is not finite, or as large as
     /// 1.8e18, are never hit; those without area hardly.
     ///
     /// # Errors
@@ -47,6 +51,7 @@ impl Geometry {
         device: &Device,
         positions: &[[f32; 3]],
         indices: &[[u32; 3]],
+        filter: Option<Box<dyn HitFilter>>,
     ) -> Result<Self, EmbreeError> {
         let last = indices.as_flattened().iter().max();
         if last.is_some_and(|&last| last as usize >= positions.len()) {
@@ -54,28 +59,39 @@ impl Geometry {
                 "a triangle refers to a vertex that does not exist",
             ));
         }
-        Self::make(device, RTCGeometryType::TRIANGLE, None, |geometry| {
-            fill(
-                geometry,
-                RTCBufferType::VERTEX,
-                RTCFormat::FLOAT3,
-                positions,
-            )?;
-            fill(geometry, RTCBufferType::INDEX, RTCFormat::UINT3, indices)
-        })
+        Self::make(
+            device,
+            RTCGeometryType::TRIANGLE,
+            None,
+            filter,
+            |geometry| {
+                fill(
+                    geometry,
+                    RTCBufferType::VERTEX,
+                    RTCFormat::FLOAT3,
+                    positions,
+                )?;
+                fill(geometry, RTCBufferType::INDEX, RTCFormat::UINT3, indices)
+            },
+        )
     }
 
     /// Spheres, as centre and radius; sphere `i` is primitive `i`.
     ///
-    /// The slice is copied. A sphere is hit from outside and from inside. Spheres that are
+    /// `filter` decides about its hits, if there is one. The slice is copied. A sphere is hit from outside and from inside. Spheres that are
     /// not finite, have a negative radius, or reach 1.8e18 are never hit. One of radius 0
     /// may be.
     ///
     /// # Errors
     ///
     /// If there are more than 2³²-1 spheres or memory runs out.
-    pub fn spheres(device: &Device, spheres: &[[f32; 4]]) -> Result<Self, EmbreeError> {
-        Self::make(device, RTCGeometryType::SPHERE_POINT, None, |geometry| {
+    pub fn spheres(
+        device: &Device,
+        spheres: &[[f32; 4]],
+        filter: Option<Box<dyn HitFilter>>,
+    ) -> Result<Self, EmbreeError> {
+        let kind = RTCGeometryType::SPHERE_POINT;
+        Self::make(device, kind, None, filter, |geometry| {
             fill(geometry, RTCBufferType::VERTEX, RTCFormat::FLOAT4, spheres)
         })
     }
@@ -113,6 +129,7 @@ impl Geometry {
             device,
             RTCGeometryType::INSTANCE,
             Some(scene.clone()),
+            None,
             |geometry| {
                 // SAFETY: both handles are alive and of one device. Embree counts a reference to
                 // the scene, and `instanced` holds one too.
@@ -138,6 +155,7 @@ impl Geometry {
         device: &Device,
         kind: RTCGeometryType,
         instanced: Option<CommittedScene>,
+        filter: Option<Box<dyn HitFilter>>,
         fill: impl FnOnce(RTCGeometry) -> Result<(), EmbreeError>,
     ) -> Result<Self, EmbreeError> {
         device.build(|| {
@@ -147,9 +165,13 @@ impl Geometry {
             let this = Self {
                 geometry,
                 instanced,
+                filter: filter.map(|f| Arc::new(Filter(f))),
                 device: device.clone(),
             };
             fill(geometry.as_ptr())?;
+            if let Some(filter) = &this.filter {
+                filter::install(geometry.as_ptr(), filter);
+            }
             // SAFETY: the geometry is alive and only known here.
             unsafe { embree4_sys::rtcCommitGeometry(geometry.as_ptr()) };
             Ok(this)
@@ -164,6 +186,11 @@ impl Geometry {
     /// The device this was made with.
     pub(super) fn device(&self) -> &Device {
         &self.device
+    }
+
+    /// Who decides about its hits; to be held by whoever queries it.
+    pub(super) fn filter(&self) -> Option<&Arc<Filter>> {
+        self.filter.as_ref()
     }
 
     /// The scene this is an instance of.

@@ -8,6 +8,7 @@
 
 mod abi;
 mod device;
+mod filter;
 mod geometry;
 mod scene;
 
@@ -15,6 +16,7 @@ mod scene;
 mod tests;
 
 pub use device::{Device, EmbreeError, ErrorCode, MemoryUse};
+pub use filter::HitFilter;
 pub use geometry::Geometry;
 pub use scene::{CommittedScene, INVALID_ID, RawHit, SceneBuilder};
 

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use embree4_sys::{RTCBounds, RTCScene, RTCSceneFlags, RTCSceneTy};
 
 use super::abi::{self, RayHit};
+use super::filter::{Context, Filter};
 use super::{Device, EmbreeError, ErrorCode, Geometry};
 
 /// The id that stands for "none" in a [`RawHit`]; no geometry may have it.
@@ -48,6 +49,8 @@ struct Handle {
     scene: NonNull<RTCSceneTy>,
     /// The scenes its instances show.
     instanced: Vec<CommittedScene>,
+    /// The filters of its geometries.
+    filters: Vec<Arc<Filter>>,
     device: Device,
 }
 
@@ -95,6 +98,7 @@ impl SceneBuilder {
             handle: Handle {
                 scene,
                 instanced: Vec::new(),
+                filters: Vec::new(),
                 device: device.clone(),
             },
         })
@@ -111,6 +115,7 @@ impl SceneBuilder {
         let Handle {
             scene,
             instanced,
+            filters,
             device,
         } = &mut self.handle;
         if !device.is(geometry.device()) {
@@ -129,6 +134,7 @@ impl SceneBuilder {
             unsafe { embree4_sys::rtcAttachGeometryByID(scene.as_ptr(), geometry.raw(), id) }
         })?;
         instanced.extend(geometry.instanced().cloned());
+        filters.extend(geometry.filter().cloned());
         Ok(())
     }
 
@@ -139,6 +145,8 @@ impl SceneBuilder {
     /// If memory runs out or Embree cannot build it.
     pub fn commit(self) -> Result<CommittedScene, EmbreeError> {
         let scene = self.handle.scene;
+        let below = |s: &CommittedScene| s.has_filters();
+        let filtered = !self.handle.filters.is_empty() || self.handle.instanced.iter().any(below);
         self.handle.device.build(|| {
             // SAFETY: the scene is alive and owned by this builder alone; its geometries are
             // committed, and the scenes of its instances too. Embree's threads are done with
@@ -147,6 +155,7 @@ impl SceneBuilder {
         })?;
         Ok(CommittedScene {
             scene,
+            filtered,
             handle: Arc::new(self.handle),
         })
     }
@@ -162,6 +171,8 @@ impl SceneBuilder {
 pub struct CommittedScene {
     /// The scene of `handle`, at hand for the queries.
     scene: NonNull<RTCSceneTy>,
+    /// Whether some hits are asked about.
+    filtered: bool,
     handle: Arc<Handle>,
 }
 
@@ -175,6 +186,9 @@ impl CommittedScene {
     #[inline]
     #[must_use]
     pub fn intersect(&self, org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> Option<RawHit> {
+        if self.filtered {
+            return self.intersect_filtered(org, dir, tnear, tfar, 0);
+        }
         if !is_ray(org, dir, tnear, tfar) {
             return None;
         }
@@ -183,21 +197,63 @@ impl CommittedScene {
         // query is ours to write, has the alignment of 16 and all the room the library may
         // use (`abi.rs`). No arguments means Embree's defaults, without callbacks.
         unsafe { embree4_sys::rtcIntersect1(self.raw(), (&raw mut query).cast(), ptr::null_mut()) };
-        let RayHit { ray, hit } = query;
-        (hit.geom != INVALID_ID).then_some(RawHit {
-            t: ray.tfar,
-            u: hit.u,
-            v: hit.v,
-            prim: hit.prim,
-            geom: hit.geom,
-            inst: hit.inst,
-        })
+        raw_hit(&query)
+    }
+
+    /// The closest hit of a ray that filters let count; `key` is what they tell rays apart by.
+    #[inline(never)]
+    #[must_use]
+    pub fn intersect_filtered(
+        &self,
+        org: [f32; 3],
+        dir: [f32; 3],
+        tnear: f32,
+        tfar: f32,
+        key: u64,
+    ) -> Option<RawHit> {
+        if !is_ray(org, dir, tnear, tfar) {
+            return None;
+        }
+        let mut query = RayHit::new(abi::ray(org, dir, tnear, tfar));
+        let mut context = Context::new(key);
+        let mut args = context.intersect_arguments();
+        // SAFETY: as in `intersect`; the arguments and the context they point at live until the
+        // call returns, and have the room that the library may use.
+        unsafe {
+            embree4_sys::rtcIntersect1(self.raw(), (&raw mut query).cast(), &raw mut args);
+        }
+        raw_hit(&query)
+    }
+
+    /// Whether a ray hits anything that filters let count.
+    #[inline(never)]
+    #[must_use]
+    pub fn occluded_filtered(
+        &self,
+        org: [f32; 3],
+        dir: [f32; 3],
+        tnear: f32,
+        tfar: f32,
+        key: u64,
+    ) -> bool {
+        if !is_ray(org, dir, tnear, tfar) {
+            return false;
+        }
+        let mut ray = abi::ray(org, dir, tnear, tfar);
+        let mut context = Context::new(key);
+        let mut args = context.occluded_arguments();
+        // SAFETY: as in `intersect_filtered`.
+        unsafe { embree4_sys::rtcOccluded1(self.raw(), &raw mut ray, &raw mut args) };
+        ray.tfar < 0.0
     }
 
     /// Whether a ray hits anything.
     #[inline]
     #[must_use]
     pub fn occluded(&self, org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> bool {
+        if self.filtered {
+            return self.occluded_filtered(org, dir, tnear, tfar, 0);
+        }
         if !is_ray(org, dir, tnear, tfar) {
             return false;
         }
@@ -241,10 +297,29 @@ impl CommittedScene {
         &self.handle.device
     }
 
+    /// Whether hits of some of its geometries are asked about.
+    #[must_use]
+    pub fn has_filters(&self) -> bool {
+        self.filtered
+    }
+
     /// Whether some of its geometries are instances.
     pub(super) fn has_instances(&self) -> bool {
         !self.handle.instanced.is_empty()
     }
+}
+
+/// What a query found.
+#[inline]
+fn raw_hit(RayHit { ray, hit }: &RayHit) -> Option<RawHit> {
+    (hit.geom != INVALID_ID).then_some(RawHit {
+        t: ray.tfar,
+        u: hit.u,
+        v: hit.v,
+        prim: hit.prim,
+        geom: hit.geom,
+        inst: hit.inst,
+    })
 }
 
 /// Whether Embree may see this ray.

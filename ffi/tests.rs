@@ -17,11 +17,11 @@ fn device() -> Device {
 }
 
 fn triangle(device: &Device) -> Geometry {
-    Geometry::triangles(device, &TRIANGLE, &[[0, 1, 2]]).expect("a triangle")
+    Geometry::triangles(device, &TRIANGLE, &[[0, 1, 2]], None).expect("a triangle")
 }
 
 fn spheres(device: &Device, spheres: &[[f32; 4]]) -> Geometry {
-    Geometry::spheres(device, spheres).expect("spheres")
+    Geometry::spheres(device, spheres, None).expect("spheres")
 }
 
 fn scene(device: &Device, geometries: &[(u32, &Geometry)]) -> CommittedScene {
@@ -127,7 +127,8 @@ fn ids_tell_geometry_and_primitive() {
         [8.0, 1.0, 0.0],
         [9.0, 1.0, 0.0],
     ];
-    let mesh = Geometry::triangles(&device, &positions, &[[0, 1, 2], [2, 1, 3]]).expect("a mesh");
+    let mesh =
+        Geometry::triangles(&device, &positions, &[[0, 1, 2], [2, 1, 3]], None).expect("a mesh");
     let scene = scene(&device, &[(7, &spheres(&device, &two)), (3, &mesh)]);
     for (x, y, expected) in [
         (0.0, 0.0, (7, 0)),
@@ -225,7 +226,7 @@ fn the_library_writes_within_the_ray_hit() {
 #[test]
 fn an_empty_scene_is_never_hit() {
     let device = device();
-    let empty = Geometry::triangles(&device, &[], &[]).expect("an empty mesh");
+    let empty = Geometry::triangles(&device, &[], &[], None).expect("an empty mesh");
     let none = spheres(&device, &[]);
     for scene in [
         scene(&device, &[]),
@@ -310,7 +311,7 @@ fn bad_geometry_is_an_error() {
     let (device, other) = (device(), device());
     let argument = Some(ErrorCode::InvalidArgument);
     assert_eq!(
-        code(Geometry::triangles(&device, &TRIANGLE, &[[0, 1, 3]])),
+        code(Geometry::triangles(&device, &TRIANGLE, &[[0, 1, 3]], None)),
         argument
     );
     let content = scene(&device, &[(0, &triangle(&device))]);

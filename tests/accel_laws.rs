@@ -62,6 +62,7 @@ impl Make {
             placement: world.map(|w| Placement::new(w).unwrap()),
             material: MaterialId(0),
             light: None,
+            coverage: None,
             name: Arc::from("object"),
         });
         self

@@ -4,17 +4,27 @@
 //! placed ones as instances of their shape's scene. Whichever it is, the id that Embree reports
 //! at the top is the [`ObjectId`].
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::{Accelerator, AcceleratorEntry, BuildStats};
 use crate::error::{Error, Result};
-use crate::ffi::{CommittedScene, Device, EmbreeError, Geometry as EmbreeGeometry, SceneBuilder};
-use crate::geometry::{Geometry, Hit, ObjectId, Ray, Shape};
+use crate::ffi::{
+    CommittedScene, Device, EmbreeError, Geometry as EmbreeGeometry, HitFilter, RawHit,
+    SceneBuilder,
+};
+use crate::geometry::{
+    Coverage, CoverageQuery, Geometry, Hit, MaterialId, Object, ObjectId, Ray, Shape, ShapeId,
+    ray_key,
+};
 use crate::math::DAffine3;
 
 struct Embree {
     scene: CommittedScene,
+    /// Whether some surface is not whole.
+    filtered: bool,
     device: Device,
     seconds: f64,
     primitives: u64,
@@ -23,9 +33,14 @@ struct Embree {
 impl Accelerator for Embree {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let h = self
-            .scene
-            .intersect(ray.o.into(), ray.d.into(), ray.tmin, ray.tmax)?;
+        let (o, d) = (ray.o.into(), ray.d.into());
+        let h = if self.filtered {
+            let key = ray_key(ray);
+            self.scene
+                .intersect_filtered(o, d, ray.tmin, ray.tmax, key)?
+        } else {
+            self.scene.intersect(o, d, ray.tmin, ray.tmax)?
+        };
         Some(Hit {
             t: h.t,
             u: h.u,
@@ -37,8 +52,12 @@ impl Accelerator for Embree {
 
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
-        self.scene
-            .occluded(ray.o.into(), ray.d.into(), ray.tmin, ray.tmax)
+        let (o, d) = (ray.o.into(), ray.d.into());
+        if self.filtered {
+            let key = ray_key(ray);
+            return self.scene.occluded_filtered(o, d, ray.tmin, ray.tmax, key);
+        }
+        self.scene.occluded(o, d, ray.tmin, ray.tmax)
     }
 
     fn stats(&self) -> BuildStats {
@@ -60,10 +79,41 @@ fn failure(e: EmbreeError) -> Error {
     }
 }
 
-fn shape_geometry(device: &Device, shape: &Shape) -> Result<EmbreeGeometry, EmbreeError> {
-    match shape {
-        Shape::Mesh(m) => EmbreeGeometry::triangles(device, &m.positions, &m.indices),
-        Shape::Spheres(s) => EmbreeGeometry::spheres(device, &s.spheres),
+/// Asks about the hits of an object that is not whole.
+struct Filter {
+    geometry: Arc<Geometry>,
+    coverage: Arc<dyn Coverage>,
+    shape: ShapeId,
+}
+
+impl HitFilter for Filter {
+    fn stops(&self, key: u64, hit: &RawHit, outward: bool) -> bool {
+        let query = CoverageQuery {
+            key,
+            object: hit.top_level(),
+            prim: hit.prim,
+            barycentrics: [f64::from(hit.u), f64::from(hit.v)],
+            outward,
+        };
+        query.stops(&*self.coverage, self.geometry.shape(self.shape))
+    }
+}
+
+fn shape_geometry(
+    device: &Device,
+    geometry: &Arc<Geometry>,
+    object: &Object,
+) -> Result<EmbreeGeometry, EmbreeError> {
+    let filter = object.coverage.as_ref().map(|coverage| {
+        Box::new(Filter {
+            geometry: geometry.clone(),
+            coverage: coverage.clone(),
+            shape: object.shape,
+        }) as Box<dyn HitFilter>
+    });
+    match geometry.shape(object.shape) {
+        Shape::Mesh(m) => EmbreeGeometry::triangles(device, &m.positions, &m.indices, filter),
+        Shape::Spheres(s) => EmbreeGeometry::spheres(device, &s.spheres, filter),
     }
 }
 
@@ -77,23 +127,23 @@ fn columns(m: &DAffine3) -> [[f32; 3]; 4] {
     .map(|c| c.as_vec3().into())
 }
 
-fn build_scene(geometry: &Geometry, threads: usize) -> Result<Embree, EmbreeError> {
+fn build_scene(geometry: &Arc<Geometry>, threads: usize) -> Result<Embree, EmbreeError> {
     let start = Instant::now();
     let device = Device::new(&format!("threads={}", threads.max(1)))?;
     let mut top = SceneBuilder::new(&device)?;
-    let mut shared: Vec<Option<CommittedScene>> = vec![None; geometry.shapes.len()];
+    // One scene for each shape, and one more for each material through which it is not whole.
+    let mut shared: HashMap<(ShapeId, Option<MaterialId>), CommittedScene> = HashMap::new();
     for (i, object) in geometry.objects.iter().enumerate() {
-        let shape = geometry.shape(object.shape);
         let attached = match &object.placement {
-            None => shape_geometry(&device, shape)?,
+            None => shape_geometry(&device, geometry, object)?,
             Some(place) => {
-                let slot = &mut shared[object.shape.index()];
-                let scene = match slot {
-                    Some(scene) => &*scene,
-                    None => {
+                let material = object.coverage.as_ref().map(|_| object.material);
+                let scene = match shared.entry((object.shape, material)) {
+                    Entry::Occupied(e) => e.into_mut(),
+                    Entry::Vacant(e) => {
                         let mut builder = SceneBuilder::new(&device)?;
-                        builder.attach(&shape_geometry(&device, shape)?, 0)?;
-                        &*slot.insert(builder.commit()?)
+                        builder.attach(&shape_geometry(&device, geometry, object)?, 0)?;
+                        e.insert(builder.commit()?)
                     }
                 };
                 EmbreeGeometry::instance(&device, scene, columns(&place.world_from_object))?
@@ -102,6 +152,7 @@ fn build_scene(geometry: &Geometry, threads: usize) -> Result<Embree, EmbreeErro
         top.attach(&attached, i as u32)?;
     }
     Ok(Embree {
+        filtered: !geometry.is_whole(),
         scene: top.commit()?,
         seconds: start.elapsed().as_secs_f64(),
         primitives: geometry.shapes.iter().map(|s| s.len() as u64).sum(),

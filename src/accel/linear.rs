@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::{Accelerator, AcceleratorEntry, BuildStats};
 use crate::error::Result;
 use crate::geometry::triangle::Watertight;
-use crate::geometry::{Geometry, Hit, ObjectId, Ray, Shape, sphere};
+use crate::geometry::{
+    Coverage, CoverageQuery, Geometry, Hit, ObjectId, Ray, Shape, ray_key, sphere,
+};
 use crate::math::DVec3;
 
 /// An intersection with one primitive, in `f64`.
@@ -60,8 +62,49 @@ impl PreparedRay {
     }
 }
 
+/// The first hit of a primitive from `tmin` on that its coverage lets count. `which` is the
+/// ray's key, the object and the primitive; `find` gives the first hit from a distance on.
+pub(super) fn uncut(
+    coverage: &dyn Coverage,
+    shape: &Shape,
+    ray: &PreparedRay,
+    which: (u64, u32, u32),
+    mut tmin: f64,
+    find: impl Fn(f64) -> Option<PrimHit>,
+) -> Option<PrimHit> {
+    let (key, object, prim) = which;
+    // A sphere can be hit twice.
+    for _ in 0..2 {
+        let h = find(tmin)?;
+        let outward = match shape {
+            Shape::Mesh(_) => false,
+            Shape::Spheres(set) => {
+                let (center, _) = set.get(prim);
+                (ray.o + ray.d * h.t - center).dot(ray.d) > 0.0
+            }
+        };
+        let query = CoverageQuery {
+            key,
+            object,
+            prim,
+            barycentrics: [h.u, h.v],
+            outward,
+        };
+        if query.stops(coverage, shape) {
+            return Some(h);
+        }
+        if matches!(shape, Shape::Mesh(_)) {
+            return None;
+        }
+        tmin = h.t.next_up();
+    }
+    None
+}
+
 struct Linear {
     geometry: Arc<Geometry>,
+    /// Whether no hit need be asked about.
+    whole: bool,
 }
 
 impl Linear {
@@ -71,6 +114,7 @@ impl Linear {
         }
         let (tmin, mut tmax) = (f64::from(ray.tmin), f64::from(ray.tmax));
         let world = PreparedRay::new(ray.origin(), ray.direction());
+        let key = if self.whole { 0 } else { ray_key(ray) };
         let mut best = None;
         for (i, object) in self.geometry.objects.iter().enumerate() {
             let local = match &object.placement {
@@ -82,7 +126,12 @@ impl Linear {
             };
             let shape = self.geometry.shape(object.shape);
             for prim in 0..shape.len() as u32 {
-                let Some(h) = intersect_prim(shape, prim, &local, tmin, tmax) else {
+                let find = |tmin| intersect_prim(shape, prim, &local, tmin, tmax);
+                let h = match &object.coverage {
+                    None => find(tmin),
+                    Some(c) => uncut(&**c, shape, &local, (key, i as u32, prim), tmin, find),
+                };
+                let Some(h) = h else {
                     continue;
                 };
                 // Of equal distances the first stays.
@@ -125,6 +174,7 @@ impl Accelerator for Linear {
 
 fn build(geometry: &Arc<Geometry>, _threads: usize) -> Result<Box<dyn Accelerator>> {
     Ok(Box::new(Linear {
+        whole: geometry.is_whole(),
         geometry: geometry.clone(),
     }))
 }

@@ -93,6 +93,14 @@ impl TriangleMesh {
         }
     }
 
+    /// Texture coordinates of one set at barycentric weights; zero if the mesh has none.
+    #[inline]
+    pub fn uv(&self, set: usize, prim: u32, [b1, b2]: [f64; 2]) -> [f64; 2] {
+        let [a, b, c] = self.corner_uvs(set, prim);
+        let mix = |k: usize| a[k] + (b[k] - a[k]) * b1 + (c[k] - a[k]) * b2;
+        [mix(0), mix(1)]
+    }
+
     /// A vertex attribute interpolated over a triangle; `None` if the mesh lacks it.
     #[inline]
     pub fn interpolate<const N: usize>(

@@ -4,6 +4,7 @@
 //! A ray tracing backend says *which* primitive a ray hits and roughly where; [`SurfacePoint`]
 //! is then recomputed in `f64` on that one primitive, by the same code for every backend.
 
+mod coverage;
 mod hit;
 mod mesh;
 mod object;
@@ -13,6 +14,7 @@ mod surface;
 mod surface_point;
 pub mod triangle;
 
+pub use coverage::{Coverage, CoverageQuery, ray_key};
 pub use hit::Hit;
 pub use mesh::{Invalid, TriangleMesh};
 pub use object::{Geometry, Object, Placement, Shape, SphereSet};

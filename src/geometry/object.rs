@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::mesh::COORDINATE_LIMIT;
 use super::{
-    Hit, Invalid, LightId, MaterialId, ObjectId, Ray, ShapeId, SurfacePoint, TriangleMesh,
+    Coverage, Hit, Invalid, LightId, MaterialId, ObjectId, Ray, ShapeId, SurfacePoint, TriangleMesh,
 };
 use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3, Vec3};
 
@@ -85,7 +85,7 @@ impl Shape {
 }
 
 /// A shape placed in the world, with its material.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Object {
     /// What is placed.
     pub shape: ShapeId,
@@ -96,8 +96,23 @@ pub struct Object {
     pub material: MaterialId,
     /// The light it is, if it emits.
     pub light: Option<LightId>,
+    /// How much of it is there, if not all of it.
+    pub coverage: Option<Arc<dyn Coverage>>,
     /// Name of the node it came from.
     pub name: Arc<str>,
+}
+
+impl std::fmt::Debug for Object {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Object")
+            .field("name", &self.name)
+            .field("shape", &self.shape)
+            .field("placement", &self.placement)
+            .field("material", &self.material)
+            .field("light", &self.light)
+            .field("whole", &self.coverage.is_none())
+            .finish()
+    }
 }
 
 /// An affine placement with what queries need of it.
@@ -147,6 +162,11 @@ impl Geometry {
     #[inline]
     pub fn shape(&self, id: ShapeId) -> &Shape {
         &self.shapes[id.0 as usize]
+    }
+
+    /// Whether every surface is whole, so that hits need not be asked about.
+    pub fn is_whole(&self) -> bool {
+        self.objects.iter().all(|o| o.coverage.is_none())
     }
 
     /// World-space box of an object.

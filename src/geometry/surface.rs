@@ -61,12 +61,7 @@ impl<'a> Surface<'a> {
     #[inline]
     pub fn uv(&self, set: usize) -> [f64; 2] {
         match self.shape {
-            Some(Shape::Mesh(mesh)) => {
-                let [a, b, c] = mesh.corner_uvs(set, self.sp.prim);
-                let [b1, b2] = self.sp.barycentrics;
-                let mix = |k: usize| a[k] + (b[k] - a[k]) * b1 + (c[k] - a[k]) * b2;
-                [mix(0), mix(1)]
-            }
+            Some(Shape::Mesh(mesh)) => mesh.uv(set, self.sp.prim, self.sp.barycentrics),
             Some(Shape::Spheres(_)) => {
                 let n = self.local_normal();
                 let u = n.y.atan2(n.x) * (0.5 * std::f64::consts::FRAC_1_PI);

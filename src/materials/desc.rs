@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use super::alpha::Alpha;
 use super::slots::TextureSlots;
 use crate::color::Rgb;
+use crate::geometry::Coverage;
 
 /// What a material's alpha means (glTF 2.0, 3.9.4).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -161,6 +163,11 @@ impl MaterialDesc {
             && self.sheen_color.is_black()
             && self.anisotropy == 0.0
             && self.iridescence == 0.0
+    }
+
+    /// How much of the surface is there, if not all of it.
+    pub fn coverage(&self) -> Option<Arc<dyn Coverage>> {
+        Alpha::new(self).map(|a| Arc::new(a) as Arc<dyn Coverage>)
     }
 
     /// The enclosed medium, if it absorbs (Beer–Lambert).

@@ -7,6 +7,7 @@
 //! Directions `wo` and `wi` point away from the surface. Lobes work in the local frame whose
 //! `z` axis is the shading normal on the side of `wo`.
 
+mod alpha;
 mod bsdf;
 mod cover;
 mod desc;

@@ -120,7 +120,7 @@ mod tests {
                 let want = schlick(base, cos);
                 // The model gives both faces of the vanished film Schlick's grazing term.
                 let twice = 2.0 * (1.0 - cos).powi(5);
-                assert!((r - want).abs() < 0.01 + twice, "{base} {cos}: {r} {want}");
+                assert!((r - want).abs() < 0.02 + twice, "{base} {cos}: {r} {want}");
             }
         }
     }

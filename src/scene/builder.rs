@@ -13,8 +13,8 @@ use crate::color::Rgb;
 use crate::error::{Error, Result};
 
 use crate::geometry::{
-    Geometry, Invalid, LightId, MaterialId, Object, ObjectId, Placement, Shape, ShapeId, SphereSet,
-    TriangleMesh,
+    Coverage, Geometry, Invalid, LightId, MaterialId, Object, ObjectId, Placement, Shape, ShapeId,
+    SphereSet, TriangleMesh,
 };
 use crate::lights::{LightDesc, LightEntry};
 use crate::materials::{Material, MaterialDesc, MaterialEntry};
@@ -67,7 +67,12 @@ pub struct MeshPlacement {
 pub struct SceneBuilder {
     plugins: ScenePlugins,
     shapes: Vec<Shape>,
-    materials: Vec<(Box<dyn Material>, String, Option<Emission>)>,
+    materials: Vec<(
+        Box<dyn Material>,
+        String,
+        Option<Emission>,
+        Option<Arc<dyn Coverage>>,
+    )>,
     placements: Vec<MeshPlacement>,
     lights: Vec<LightDesc>,
     cameras: Vec<CameraDesc>,
@@ -141,7 +146,8 @@ impl SceneBuilder {
             radiance: desc.emission,
             double_sided: desc.double_sided,
         });
-        self.materials.push((material, desc.name.clone(), emission));
+        self.materials
+            .push((material, desc.name.clone(), emission, desc.coverage()));
         Ok(MaterialId(self.materials.len() as u32 - 1))
     }
 
@@ -179,7 +185,7 @@ impl SceneBuilder {
             c.world_from_camera.translation -= center;
         }
         let (mut materials, mut material_names) = (Vec::new(), Vec::new());
-        for (m, name, _) in self.materials {
+        for (m, name, ..) in self.materials {
             materials.push(m);
             material_names.push(name);
         }
@@ -279,6 +285,7 @@ impl SceneBuilder {
                 placement,
                 material: p.material,
                 light: None,
+                coverage: self.materials[p.material.index()].3.clone(),
                 name: Arc::from(p.name),
             });
         }

@@ -20,10 +20,10 @@ use glam::Vec3A;
 
 use self::build::{Ref, Tree};
 use self::node::{OFFSET_BITS, Slab, traverse};
-use super::linear::{PreparedRay, PrimHit};
+use super::linear::{PreparedRay, PrimHit, uncut};
 use super::{Accelerator, AcceleratorEntry, BuildStats};
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Hit, Object, ObjectId, Placement, Ray, Shape, sphere};
+use crate::geometry::{Geometry, Hit, Object, ObjectId, Placement, Ray, Shape, ray_key, sphere};
 use crate::math::{Aabb, DMat3, DVec3, Vec3, max_abs};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,6 +159,8 @@ fn instance_bounds(level: &Level, p: &Placement) -> (Bounds, f64) {
 
 struct Bvh {
     geometry: Arc<Geometry>,
+    /// Whether no hit need be asked about.
+    whole: bool,
     top: Level,
     /// Trees of the shapes that instances place.
     shapes: Vec<Level>,
@@ -173,6 +175,8 @@ struct Bvh {
 struct Search {
     tmin: f64,
     tmax: f64,
+    /// The ray's key, if some hits are to be asked about.
+    key: Option<u64>,
     best: Option<(PrimHit, u32, u32)>,
 }
 
@@ -192,10 +196,10 @@ impl Search {
 }
 
 #[inline(always)]
-fn test(prim: &Prim, ray: &PreparedRay, search: &Search) -> Option<PrimHit> {
+fn test(prim: &Prim, ray: &PreparedRay, search: &Search, tmin: f64) -> Option<PrimHit> {
     if prim.kind == Kind::Triangle {
         ray.watertight
-            .intersect_single(&prim.data, search.tmin, search.tmax)
+            .intersect_single(&prim.data, tmin, search.tmax)
             .map(|h| PrimHit {
                 t: h.t,
                 u: h.b1,
@@ -204,7 +208,7 @@ fn test(prim: &Prim, ray: &PreparedRay, search: &Search) -> Option<PrimHit> {
     } else {
         let c = Vec3::from(prim.data[0]).as_dvec3();
         let r = f64::from(prim.data[1][0]);
-        sphere::intersect(ray.o, ray.d, c, r, search.tmin, search.tmax).map(|t| PrimHit {
+        sphere::intersect(ray.o, ray.d, c, r, tmin, search.tmax).map(|t| PrimHit {
             t,
             u: 0.0,
             v: 0.0,
@@ -213,6 +217,42 @@ fn test(prim: &Prim, ray: &PreparedRay, search: &Search) -> Option<PrimHit> {
 }
 
 impl Bvh {
+    /// Tests a primitive of `object`, and asks about the hit where that is not whole.
+    #[inline(always)]
+    fn test(
+        &self,
+        prim: &Prim,
+        object: u32,
+        ray: &PreparedRay,
+        search: &Search,
+    ) -> Option<PrimHit> {
+        match search.key {
+            None => test(prim, ray, search, search.tmin),
+            Some(key) => self.test_uncut(prim, object, ray, search, key),
+        }
+    }
+
+    #[inline(never)]
+    fn test_uncut(
+        &self,
+        prim: &Prim,
+        object: u32,
+        ray: &PreparedRay,
+        search: &Search,
+        key: u64,
+    ) -> Option<PrimHit> {
+        let find = |tmin| test(prim, ray, search, tmin);
+        let at = &self.geometry.objects[object as usize];
+        match &at.coverage {
+            None => find(search.tmin),
+            Some(coverage) => {
+                let shape = self.geometry.shape(at.shape);
+                let which = (key, object, prim.prim);
+                uncut(&**coverage, shape, ray, which, search.tmin, find)
+            }
+        }
+    }
+
     #[inline(always)]
     fn search<const ANY: bool>(&self, ray: &Ray) -> Option<(PrimHit, u32, u32)> {
         if !ray.is_valid() {
@@ -221,6 +261,7 @@ impl Bvh {
         let mut search = Search {
             tmin: f64::from(ray.tmin),
             tmax: f64::from(ray.tmax),
+            key: (!self.whole).then(|| ray_key(ray)),
             best: None,
         };
         let world = PreparedRay::new(ray.origin(), ray.direction());
@@ -236,7 +277,7 @@ impl Bvh {
                 for prim in &level.prims[first..first + count] {
                     if prim.kind == Kind::Instance {
                         self.instance::<ANY>(prim, &world, &mut search);
-                    } else if let Some(h) = test(prim, &world, &search) {
+                    } else if let Some(h) = self.test(prim, prim.object, &world, &search) {
                         search.offer(h, prim.object, prim.prim);
                     }
                     if ANY && search.best.is_some() {
@@ -271,7 +312,7 @@ impl Bvh {
             bound,
             |first, count, bound| {
                 for prim in &level.prims[first..first + count] {
-                    if let Some(h) = test(prim, &local, search) {
+                    if let Some(h) = self.test(prim, at.object, &local, search) {
                         search.offer(h, at.object, prim.prim);
                         if ANY {
                             return false;
@@ -374,6 +415,7 @@ fn build_with(geometry: &Arc<Geometry>, parallel: bool) -> Result<Bvh> {
             .count() as u64,
     };
     Ok(Bvh {
+        whole: geometry.is_whole(),
         geometry: geometry.clone(),
         top,
         shapes,
