@@ -26,6 +26,7 @@ fn add(geometry: &mut Geometry, shape: Shape) {
         placement: None,
         material: MaterialId(0),
         light: None,
+        coverage: None,
         name: Arc::from("object"),
     });
 }

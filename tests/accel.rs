@@ -32,6 +32,7 @@ fn object(shape: u32, placement: Option<DAffine3>) -> Object {
         placement: placement.map(|p| Placement::new(p).expect("regular")),
         material: MaterialId(0),
         light: None,
+        coverage: None,
         name: "object".into(),
     }
 }
