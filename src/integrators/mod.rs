@@ -6,6 +6,7 @@ mod light_sampling;
 mod path;
 mod photon;
 mod settings;
+mod stored_light;
 
 pub use camera_pass::{Region, camera_pass};
 pub use settings::IntegratorSettings;

@@ -109,6 +109,12 @@ impl Integrator for Path<'_> {
             if depth == 0 {
                 out.albedo += bsdf.albedo();
             }
+            if let Some(color) = bsdf.shown() {
+                if matches!(walk, Walk::Camera | Walk::Specular) {
+                    out.add(walk.component(), beta * color);
+                }
+                break;
+            }
             if depth >= max_depth {
                 break;
             }

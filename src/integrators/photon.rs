@@ -14,6 +14,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::light_sampling::{power_heuristic, sample_direct};
+use super::stored_light::{Stored, sites};
 use super::{Integrator, IntegratorEntry, RenderContext, Scratch};
 use arrayvec::ArrayVec;
 
@@ -24,7 +25,6 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::math::DVec3;
 use crate::photons::PhotonClass;
-use crate::photons::map::Site;
 use crate::sampling::Sampler;
 
 /// Longest chain of specular surfaces.
@@ -60,10 +60,6 @@ struct Gathered {
     sp: SurfacePoint,
     bsdf: Bsdf,
     beta: Rgb,
-}
-
-fn site(sp: &SurfacePoint) -> Site {
-    Site::new(sp.p, if sp.front { sp.ng } else { -sp.ng })
 }
 
 /// A specular chain from the camera, at its next segment.
@@ -152,6 +148,15 @@ impl PhotonMapping<'_> {
                     Component::Specular
                 };
                 out.add(component, beta * cx.scene.emitted(&sp) * weight);
+            }
+            if let Some(color) = bsdf.shown() {
+                let component = if depth == 0 {
+                    Component::Direct
+                } else {
+                    Component::Specular
+                };
+                out.add(component, beta * color);
+                return;
             }
             if depth >= guard {
                 return;
@@ -291,14 +296,10 @@ impl PhotonMapping<'_> {
         }
 
         // The caustic map.
-        let here = site(sp);
+        let stored = Stored { maps: cx.maps };
+        let sites = sites(sp, bsdf);
         if let Some(map) = &cx.maps.caustic {
-            let e = map.estimate(
-                &here,
-                &mut scratch.nearest,
-                |_| true,
-                |wi| bsdf.diffuse_f(wi),
-            );
+            let e = stored.density(map, &sites, bsdf, |_| true, scratch);
             light.caustics += e.value;
             if let Some(d) = &mut densities {
                 d[1] += e.density;
@@ -307,18 +308,14 @@ impl PhotonMapping<'_> {
 
         // The global map: seen by gather rays, or directly.
         if let Some(d) = &mut densities
-            && let Some(s) = self.irradiance(&here, scratch)
+            && let Some(s) = stored.irradiance(&sites[0], scratch)
         {
-            d[0] += s.2;
+            d[0] += f64::from(s.density);
         }
         if gather_rays == 0 {
             if let Some(map) = &cx.maps.global {
-                let e = map.estimate(
-                    &here,
-                    &mut scratch.nearest,
-                    |class| class == PhotonClass::Indirect,
-                    |wi| bsdf.diffuse_f(wi),
-                );
+                let keep = |class| class == PhotonClass::Indirect;
+                let e = stored.density(map, &sites, bsdf, keep, scratch);
                 light.indirect += e.value;
                 if let Some(d) = &mut densities {
                     d[0] += e.density;
@@ -326,7 +323,7 @@ impl PhotonMapping<'_> {
             }
             return light;
         }
-        light.indirect += self.glow(&here, bsdf, scratch);
+        light.indirect += stored.glow(&sites, bsdf, scratch);
         let share = 1.0 / n_gather;
         for _ in 0..gather_rays {
             let u = sampler.next_2d();
@@ -418,20 +415,21 @@ impl PhotonMapping<'_> {
         steps: u32,
     ) -> Rgb {
         let cx = &self.cx;
-        let here = site(&at.sp);
-        let Some((irradiance, radius, _)) = self.irradiance(&here, scratch) else {
-            return Rgb::ZERO;
-        };
+        let stored = Stored { maps: cx.maps };
+        let sites = sites(&at.sp, &at.bsdf);
+        let near = stored.irradiance(&sites[0], scratch);
+        let radius = near.map_or(0.0, |s| f64::from(s.radius));
         if at.sp.distance >= NEAR * radius || steps >= NEAR_STEPS {
             return at.beta
-                * match at.bsdf.as_lambert() {
-                    Some(albedo) => albedo * irradiance * FRAC_1_PI,
-                    None => self.density(&here, &at.bsdf, scratch),
+                * match (at.bsdf.as_lambert(), near) {
+                    (Some(albedo), Some(s)) => albedo * s.irradiance() * FRAC_1_PI,
+                    (Some(_), None) => Rgb::ZERO,
+                    (None, _) => stored.reflected(&sites, &at.bsdf, scratch),
                 };
         }
         // Too near: direct light and glow here, the rest from one surface further. (Caustics here
         // are the glow of the surface that the gather ray left.)
-        let mut sum = self.glow(&here, &at.bsdf, scratch);
+        let mut sum = stored.glow(&sites, &at.bsdf, scratch);
         if let Some(direct) = sample_direct(cx, &at.sp, &at.bsdf, sampler.next_2d(), 1.0, 0.0) {
             scratch.rays.shadow += 1;
             if !cx.accel.occluded(&direct.ray) {
@@ -447,36 +445,6 @@ impl PhotonMapping<'_> {
             }
         }
         at.beta * sum
-    }
-
-    /// Irradiance, kernel radius and photon density at a site.
-    fn irradiance(&self, here: &Site, scratch: &mut Scratch) -> Option<(Rgb, f64, f64)> {
-        let map = self.cx.maps.irradiance.as_ref()?;
-        let s = map.nearest(here, &mut scratch.nearest)?;
-        Some((s.irradiance(), f64::from(s.radius), f64::from(s.density)))
-    }
-
-    /// Radiance reflected by diffuse lobes that are not Lambert's, from all photons.
-    fn density(&self, here: &Site, bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
-        let maps = self.cx.maps;
-        let Some(map) = &maps.global else {
-            return Rgb::ZERO;
-        };
-        let keep = |class| class != PhotonClass::Caustic;
-        let f = |wi| bsdf.diffuse_f(wi);
-        map.estimate(here, &mut scratch.nearest, keep, f).value
-    }
-
-    /// Radiance reflected of the light that caustics on other surfaces shed here. Diffuse lobes
-    /// that are not Lambert's are taken by their albedo: this light comes from all around.
-    fn glow(&self, here: &Site, bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
-        let Some(map) = &self.cx.maps.glow else {
-            return Rgb::ZERO;
-        };
-        let Some(s) = map.nearest(here, &mut scratch.nearest) else {
-            return Rgb::ZERO;
-        };
-        bsdf.albedo() * s.irradiance() * FRAC_1_PI
     }
 }
 

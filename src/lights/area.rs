@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
+use super::{EmissionMap, EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
 use crate::color::Rgb;
 use crate::geometry::{Surface, SurfacePoint};
 use crate::math::{DVec3, Frame, max_abs, robust};
@@ -20,49 +20,75 @@ struct AreaLight {
     radiance: Rgb,
     double_sided: bool,
     triangles: Vec<Triangle>,
+    /// In proportion to area, or to flux where a map varies it.
     choose: Discrete,
+    area: f64,
+    map: Option<Mapped>,
+}
+
+/// What a light with a map needs beside it.
+struct Mapped {
+    map: EmissionMap,
+    /// Density in area of points on each triangle, 1/m².
+    pdf_area: Vec<f64>,
+    /// Mean of the map over the surface.
+    mean: Rgb,
+}
+
+/// A point on the light.
+struct Point<'a> {
+    triangle: &'a Triangle,
+    p: DVec3,
+    radiance: Rgb,
+    pdf_area: f64,
 }
 
 impl AreaLight {
+    /// A random point.
     #[inline]
-    fn area(&self) -> f64 {
-        self.choose.total()
-    }
-
-    /// A uniform point over all triangles.
-    #[inline]
-    fn point(&self, u: [f64; 2]) -> Option<(&Triangle, DVec3)> {
+    fn point(&self, u: [f64; 2]) -> Option<Point<'_>> {
         let (i, _, rest) = self.choose.sample(u[0])?;
-        let tri = &self.triangles[i];
-        let [b1, b2] = warp::triangle([rest, u[1]]);
-        Some((tri, tri.v0 + tri.e1 * b1 + tri.e2 * b2))
+        let triangle = &self.triangles[i];
+        let b = warp::triangle([rest, u[1]]);
+        let (radiance, pdf_area) = match &self.map {
+            None => (self.radiance, 1.0 / self.area),
+            Some(m) => (self.radiance * m.map.at(i as u32, b), m.pdf_area[i]),
+        };
+        Some(Point {
+            triangle,
+            p: triangle.v0 + triangle.e1 * b[0] + triangle.e2 * b[1],
+            radiance,
+            pdf_area,
+        })
     }
 }
 
 impl Light for AreaLight {
     fn power(&self) -> Rgb {
         let sides = if self.double_sided { 2.0 } else { 1.0 };
-        self.radiance * (PI * self.area() * sides)
+        let mean = self.map.as_ref().map_or(Rgb::ONE, |m| m.mean);
+        self.radiance * mean * (PI * self.area * sides)
     }
 
     #[inline]
     fn sample_li(&self, p: DVec3, u: [f64; 2]) -> Option<LiSample> {
-        let (tri, q) = self.point(u)?;
-        let to = q - p;
+        let on = self.point(u)?;
+        let to = on.p - p;
         let d2 = to.length_squared();
         if !(d2 > 0.0) {
             return None;
         }
         let wi = to * (1.0 / d2.sqrt());
-        let cos = -wi.dot(tri.ng);
+        let ng = on.triangle.ng;
+        let cos = -wi.dot(ng);
         if cos == 0.0 || (cos < 0.0 && !self.double_sided) {
             return None;
         }
         Some(LiSample {
             wi,
-            target: Some(q + tri.ng * tri.offset.copysign(cos)),
-            radiance: self.radiance,
-            pdf: d2 / (cos.abs() * self.area()),
+            target: Some(on.p + ng * on.triangle.offset.copysign(cos)),
+            radiance: on.radiance,
+            pdf: d2 * on.pdf_area / cos.abs(),
             delta: false,
         })
     }
@@ -73,26 +99,37 @@ impl Light for AreaLight {
         if cos == 0.0 {
             return 0.0;
         }
-        (on.p - p).length_squared() / (cos * self.area())
+        let pdf_area = match &self.map {
+            None => 1.0 / self.area,
+            Some(m) => m.pdf_area[on.prim as usize],
+        };
+        (on.p - p).length_squared() * pdf_area / cos
     }
 
     #[inline]
     fn radiance(&self, on: &Surface<'_>) -> Rgb {
-        if on.sp.front || self.double_sided {
-            self.radiance
-        } else {
-            Rgb::ZERO
+        if !on.sp.front && !self.double_sided {
+            return Rgb::ZERO;
+        }
+        match self.map.as_ref().and_then(|m| m.map.texture.as_ref()) {
+            None => self.radiance,
+            // What alpha takes away the ray did not hit.
+            Some(texture) => {
+                let [r, g, b, _] = texture.sample(on);
+                self.radiance * Rgb::new(r, g, b)
+            }
         }
     }
 
     #[inline]
     fn sample_origin(&self, u: [f64; 2]) -> Option<EmissionOrigin> {
-        let (tri, p) = self.point(u)?;
+        let on = self.point(u)?;
         Some(EmissionOrigin {
-            p,
-            ng: Some(tri.ng),
-            offset: tri.offset,
-            pdf_area: 1.0 / self.area(),
+            p: on.p,
+            ng: Some(on.triangle.ng),
+            offset: on.triangle.offset,
+            pdf_area: on.pdf_area,
+            radiance: on.radiance,
         })
     }
 
@@ -120,13 +157,35 @@ impl Light for AreaLight {
         if cos <= 0.0 && !self.double_sided {
             return Rgb::ZERO;
         }
-        self.radiance * cos.abs()
+        from.radiance * cos.abs()
     }
+}
+
+/// Points at which a map is looked up in all, to tell triangles apart.
+const PROBES: usize = 1 << 14;
+
+/// Least density of points on a triangle, over that of uniform points: the probes may have
+/// missed what is bright.
+const LEAST_DENSITY: f64 = 0.1;
+
+/// Mean of the map over each triangle, by points on a lattice.
+fn means(map: &EmissionMap, triangles: usize) -> Vec<Rgb> {
+    let side = ((PROBES / triangles.max(1)) as f64).sqrt().clamp(2.0, 32.0) as u32;
+    let x = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
+    (0..triangles as u32)
+        .map(|prim| {
+            let sum: Rgb = (0..side)
+                .flat_map(|i| (0..side).map(move |j| [x(i), x(j)]))
+                .map(|u| map.at(prim, warp::triangle(u)))
+                .sum();
+            sum / f64::from(side * side)
+        })
+        .collect()
 }
 
 fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
     let mut areas = Vec::with_capacity(d.triangles.len());
-    let triangles = d
+    let triangles: Vec<Triangle> = d
         .triangles
         .iter()
         .map(|&[a, b, c]| {
@@ -143,15 +202,47 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
             }
         })
         .collect();
-    let choose = Discrete::new(areas);
-    if choose.is_empty() {
+    let area: f64 = areas.iter().sum();
+    if !(area > 0.0) {
         return Err("its triangles have no area".into());
     }
+    let mut choose = Discrete::new(areas.iter().copied());
+    let map = d.map.as_ref().map(|map| {
+        let means = means(map, triangles.len());
+        let mean: Rgb = means.iter().zip(&areas).map(|(m, a)| *m * *a).sum::<Rgb>() / area;
+        let flux = means.iter().zip(&areas).map(|(m, a)| m.luminance() * a);
+        let bright = Discrete::new(flux);
+        let weight = |i: usize| {
+            let uniform = areas[i] / area;
+            if bright.is_empty() {
+                uniform
+            } else {
+                LEAST_DENSITY * uniform + (1.0 - LEAST_DENSITY) * bright.probability(i)
+            }
+        };
+        choose = Discrete::new((0..areas.len()).map(weight));
+        let pdf_area = (0..areas.len())
+            .map(|i| {
+                if areas[i] > 0.0 {
+                    choose.probability(i) / areas[i]
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        Mapped {
+            map: map.clone(),
+            pdf_area,
+            mean,
+        }
+    });
     Ok(Box::new(AreaLight {
         radiance: d.strength,
         double_sided: d.double_sided,
         triangles,
         choose,
+        area,
+        map,
     }))
 }
 

@@ -1,7 +1,12 @@
 //! What a light is made from.
 
+use std::fmt;
+use std::sync::Arc;
+
 use crate::color::Rgb;
+use crate::geometry::{Coverage, Shape};
 use crate::math::{BoundingSphere, DVec3};
+use crate::textures::Texture;
 
 /// Parameters of a light, world space, radiometric units. A kind reads what it needs.
 #[derive(Clone, Debug)]
@@ -23,12 +28,50 @@ pub struct LightDesc {
     pub outer_cone: f64,
     /// Area: corners of the triangles, front counter-clockwise; indexed as the mesh is.
     pub triangles: Vec<[DVec3; 3]>,
+    /// Area: how the strength varies over the triangles, if it does.
+    pub map: Option<EmissionMap>,
     /// Sphere: centre and radius of each sphere; indexed as the set is.
     pub spheres: Vec<BoundingSphere>,
     /// Area: whether the back emits too.
     pub double_sided: bool,
     /// Parallel light: what it has to cover.
     pub scene: BoundingSphere,
+}
+
+/// How emission varies over a surface.
+#[derive(Clone)]
+pub struct EmissionMap {
+    /// The surface.
+    pub shape: Arc<Shape>,
+    /// The colour of the emission.
+    pub texture: Option<Texture>,
+    /// How much of the surface is there.
+    pub coverage: Option<Arc<dyn Coverage>>,
+}
+
+impl fmt::Debug for EmissionMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("EmissionMap")
+            .field("texture", &self.texture.is_some())
+            .field("whole", &self.coverage.is_none())
+            .finish()
+    }
+}
+
+impl EmissionMap {
+    /// The factor at barycentric weights of a triangle's second and third corner.
+    pub(super) fn at(&self, prim: u32, barycentrics: [f64; 2]) -> Rgb {
+        let mut value = Rgb::ONE;
+        if let (Some(texture), Shape::Mesh(mesh)) = (&self.texture, &*self.shape) {
+            let uv = mesh.uv(texture.uv_set, prim, barycentrics);
+            let [r, g, b, _] = texture.lookup(uv, None);
+            value = Rgb::new(r, g, b);
+        }
+        match &self.coverage {
+            Some(c) => value * c.opacity(&self.shape, prim, barycentrics),
+            None => value,
+        }
+    }
 }
 
 impl Default for LightDesc {
@@ -42,6 +85,7 @@ impl Default for LightDesc {
             inner_cone: 0.0,
             outer_cone: std::f64::consts::FRAC_PI_4,
             triangles: Vec::new(),
+            map: None,
             spheres: Vec::new(),
             double_sided: false,
             scene: BoundingSphere {

@@ -51,6 +51,7 @@ impl Light for DirectionalLight {
         let p = self.scene.center + (self.frame.x * x + self.frame.y * y - self.frame.z) * r;
         Some(EmissionOrigin {
             pdf_area: 1.0 / (PI * r * r),
+            radiance: Rgb::ZERO,
             ..point_origin(p)
         })
     }

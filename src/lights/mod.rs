@@ -11,7 +11,7 @@ mod point;
 mod sphere;
 mod spot;
 
-pub use desc::LightDesc;
+pub use desc::{EmissionMap, LightDesc};
 
 use crate::color::Rgb;
 use crate::geometry::{Ray, Surface, SurfacePoint};
@@ -43,6 +43,8 @@ pub struct EmissionOrigin {
     pub offset: f64,
     /// Density in area (1/m²); 1 for a point.
     pub pdf_area: f64,
+    /// Radiance of a surface there, W/(m²·sr); not used by a point.
+    pub radiance: Rgb,
 }
 
 impl EmissionOrigin {

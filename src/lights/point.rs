@@ -36,6 +36,7 @@ pub(super) fn point_origin(p: DVec3) -> EmissionOrigin {
         ng: None,
         offset: 0.0,
         pdf_area: 1.0,
+        radiance: Rgb::ZERO,
     }
 }
 

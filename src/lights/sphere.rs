@@ -108,6 +108,7 @@ impl Light for SphereLight {
             ng: Some(n),
             offset: Self::offset(s),
             pdf_area: 1.0 / self.choose.total(),
+            radiance: self.radiance,
         })
     }
 

@@ -24,6 +24,7 @@ mod dielectric;
 mod lambert;
 mod mirror;
 mod pbr;
+mod unlit;
 
 pub use bsdf::{Bsdf, BsdfSample, BsdfValue, FrameId, TransportMode};
 pub use desc::{AlphaMode, Interior, MaterialDesc, MaterialTraits};
@@ -77,5 +78,6 @@ pub static MATERIALS: &[MaterialEntry] = &[
     mirror::ENTRY,
     conductor::ENTRY,
     dielectric::ENTRY,
+    unlit::ENTRY,
     pbr::ENTRY,
 ];

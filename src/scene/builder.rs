@@ -16,11 +16,12 @@ use crate::geometry::{
     Coverage, Geometry, Invalid, LightId, MaterialId, Object, ObjectId, Placement, Shape, ShapeId,
     SphereSet, TriangleMesh,
 };
-use crate::lights::{LightDesc, LightEntry};
+use crate::lights::{EmissionMap, LightDesc, LightEntry};
 use crate::materials::{Material, MaterialDesc, MaterialEntry};
 use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3, Vec3};
 use crate::registry::Table;
 use crate::sampling::Discrete;
+use crate::textures::Texture;
 
 /// The plugin tables that a scene is built with.
 #[derive(Clone, Debug)]
@@ -41,10 +42,12 @@ impl Default for ScenePlugins {
 }
 
 /// What a surface emits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Emission {
     /// Radiance in W/(m²·sr).
     pub radiance: Rgb,
+    /// The texture that it is multiplied by.
+    pub texture: Option<Texture>,
     /// Whether the back emits too.
     pub double_sided: bool,
 }
@@ -144,6 +147,7 @@ impl SceneBuilder {
             .map_err(|e| Error::Usage(format!("material '{}': {e}", desc.name)))?;
         let emission = (!desc.emission.is_black()).then_some(Emission {
             radiance: desc.emission,
+            texture: desc.textures.as_ref().and_then(|t| t.emissive.clone()),
             double_sided: desc.double_sided,
         });
         self.materials
@@ -315,16 +319,17 @@ impl SceneBuilder {
             })
             .collect();
         for (i, object) in geometry.objects.iter().enumerate() {
-            let Some(emission) = self.materials[object.material.index()].2 else {
+            let Some(emission) = &self.materials[object.material.index()].2 else {
                 continue;
             };
             let id = ObjectId(i as u32);
-            let desc = LightDesc {
+            let mut desc = LightDesc {
                 name: object.name.to_string(),
                 strength: emission.radiance,
                 double_sided: emission.double_sided,
                 ..surface_light(&geometry, id)
             };
+            vary(&mut desc, &geometry, object, emission);
             descs.push((desc, Some(id)));
         }
         let (mut lights, mut names): (Vec<Box<dyn crate::lights::Light>>, Vec<_>) =
@@ -347,6 +352,30 @@ impl SceneBuilder {
             names.push((d.name, d.kind));
         }
         Ok((lights, names, geometry))
+    }
+}
+
+/// Lets the strength of a surface that emits follow its texture and its alpha. Spheres take
+/// their means.
+fn vary(desc: &mut LightDesc, geometry: &Geometry, object: &Object, emission: &Emission) {
+    if emission.texture.is_none() && object.coverage.is_none() {
+        return;
+    }
+    let shape = geometry.shape(object.shape);
+    match shape {
+        Shape::Mesh(_) => {
+            desc.map = Some(EmissionMap {
+                shape: Arc::new(shape.clone()),
+                texture: emission.texture.clone(),
+                coverage: object.coverage.clone(),
+            });
+        }
+        Shape::Spheres(_) => {
+            if let Some(texture) = &emission.texture {
+                let [r, g, b, _] = texture.mean();
+                desc.strength *= Rgb::new(r, g, b);
+            }
+        }
     }
 }
 

@@ -5,12 +5,13 @@
 //! contribution belongs to exactly one lobe class (diffuse, glossy or delta) and the integrators
 //! can partition path space by class.
 
+mod build;
+
 use arrayvec::ArrayVec;
 
 use super::cover::Cover;
 use super::lobes::{Lobe, LobeClass, LobeModel};
 use crate::color::Rgb;
-use crate::geometry::SurfacePoint;
 use crate::math::{DVec3, Frame};
 
 /// What is transported along a path: radiance (from the camera) or importance (photons). The
@@ -94,38 +95,11 @@ pub struct Bsdf {
     lobes: ArrayVec<Entry, MAX_LOBES>,
     covers: ArrayVec<(Cover, FrameId), 2>,
     total: f64,
+    /// What is shown instead of reflected light.
+    shown: Option<Rgb>,
 }
 
 impl Bsdf {
-    /// A surface that absorbs everything, until lobes are pushed.
-    #[inline]
-    pub fn new(sp: &SurfacePoint, mode: TransportMode) -> Self {
-        let (ng, mut n) = if sp.front {
-            (sp.ng, sp.n)
-        } else {
-            (-sp.ng, -sp.n)
-        };
-        if sp.wo.dot(n) <= 0.0 {
-            // The interpolated normal faces away from a visible point.
-            n = ng;
-        }
-        let frame = Frame::from_normal(n);
-        Self {
-            main: View {
-                wo: frame.to_local(sp.wo),
-                frame,
-            },
-            second: None,
-            wo_world: sp.wo,
-            front: sp.front,
-            ng,
-            mode,
-            lobes: ArrayVec::new(),
-            covers: ArrayVec::new(),
-            total: 0.0,
-        }
-    }
-
     #[inline(always)]
     fn view(&self, id: FrameId) -> &View {
         match &self.second {
@@ -134,93 +108,10 @@ impl Bsdf {
         }
     }
 
-    /// The frame around `n`, given on the front of the surface. A normal that faces away from
-    /// `wo` is turned until it does not, as no lobe is defined below its horizon.
-    fn view_around(&self, n: DVec3, tangent: Option<DVec3>) -> View {
-        let mut n = if self.front { n } else { -n };
-        let cos = n.dot(self.wo_world);
-        if cos < LEAST_COSINE {
-            n = (n + self.wo_world * (LEAST_COSINE - cos))
-                .try_normalize()
-                .unwrap_or(self.ng);
-        }
-        let frame = tangent
-            .and_then(|t| Frame::from_normal_and_tangent(n, t))
-            .unwrap_or_else(|| Frame::from_normal(n));
-        View {
-            wo: frame.to_local(self.wo_world),
-            frame,
-        }
-    }
-
-    /// Takes another shading normal, given on the front of the surface. To be called before
-    /// lobes are pushed.
-    pub fn set_normal(&mut self, n: DVec3) {
-        self.main = self.view_around(n, None);
-    }
-
-    /// Turns the frame about its normal, so that its first axis follows `tangent`. To be called
-    /// before lobes are pushed.
-    pub fn set_tangent(&mut self, tangent: DVec3) {
-        let n = self.main.frame.z;
-        if let Some(frame) = Frame::from_normal_and_tangent(n, tangent) {
-            self.main = View {
-                wo: frame.to_local(self.wo_world),
-                frame,
-            };
-        }
-    }
-
-    /// A second frame around `n`, given on the front of the surface.
-    pub fn add_frame(&mut self, n: DVec3) -> FrameId {
-        self.second = Some(self.view_around(n, None));
-        FrameId(1)
-    }
-
     /// Cosine between `wo` and the shading normal on its side.
     #[inline]
     pub fn cos_o(&self) -> f64 {
         self.main.wo.z
-    }
-
-    /// Adds a lobe; it is picked in proportion to its albedo. A black lobe is left out.
-    #[inline]
-    pub fn push(&mut self, lobe: impl Into<Lobe>) {
-        self.push_in(lobe, FrameId::MAIN);
-    }
-
-    /// As [`push`](Self::push), in one of the frames.
-    #[inline]
-    pub fn push_in(&mut self, lobe: impl Into<Lobe>, frame: FrameId) {
-        let lobe = lobe.into();
-        let pick = lobe.albedo(self.view(frame).wo).max_channel();
-        let entry = Entry {
-            lobe,
-            pick,
-            frame,
-            under: self.covers.len() as u8,
-        };
-        if pick > 0.0 {
-            let full = self.lobes.try_push(entry).is_err();
-            debug_assert!(!full, "more lobes than a material may stack");
-            if !full {
-                self.total += pick;
-            }
-        }
-    }
-
-    /// Lays a layer over all lobes pushed so far.
-    pub(super) fn cover(&mut self, cover: Cover, frame: FrameId) {
-        let passes = cover.passes(self.view(frame).wo.z);
-        if self.covers.try_push((cover, frame)).is_err() {
-            debug_assert!(false, "more layers than a material may stack");
-            return;
-        }
-        self.total = 0.0;
-        for e in &mut self.lobes {
-            e.pick *= passes;
-            self.total += e.pick;
-        }
     }
 
     /// What the layers above a lobe leave of the light that comes along `wi`.
@@ -286,6 +177,18 @@ impl Bsdf {
     /// Sum of the lobes' albedos.
     pub fn albedo(&self) -> Rgb {
         self.lobes.iter().map(|e| self.uncovered_albedo(e)).sum()
+    }
+
+    /// Sum of the albedos of the lobes that reflect (glossy ones that transmit too count here).
+    pub fn reflected_albedo(&self) -> Rgb {
+        self.albedo() - self.transmitted_albedo()
+    }
+
+    /// Sum of the albedos of the lobes that transmit diffusely.
+    pub fn transmitted_albedo(&self) -> Rgb {
+        let through = |e: &&Entry| matches!(e.lobe, Lobe::DiffuseTransmission(_));
+        let lobes = self.lobes.iter().filter(through);
+        lobes.map(|e| self.uncovered_albedo(e)).sum()
     }
 
     /// Probability that [`sample`](Self::sample) picks a diffuse lobe.
