@@ -139,6 +139,11 @@ fn render_in_pool(
     };
     clock.split("photons", maps.tracing, "photon maps");
 
+    if !scene.textures.is_empty() {
+        scene.prepare_textures();
+        clock.lap("textures");
+    }
+
     let context = RenderContext {
         scene,
         accel: &*accel,

@@ -76,6 +76,7 @@ pub struct SceneBuilder {
         Option<Emission>,
         Option<Arc<dyn Coverage>>,
     )>,
+    textures: Vec<Texture>,
     placements: Vec<MeshPlacement>,
     lights: Vec<LightDesc>,
     cameras: Vec<CameraDesc>,
@@ -152,6 +153,9 @@ impl SceneBuilder {
         });
         self.materials
             .push((material, desc.name.clone(), emission, desc.coverage()));
+        if let Some(slots) = &desc.textures {
+            self.textures.extend(slots.iter().map(|(_, t)| t.clone()));
+        }
         Ok(MaterialId(self.materials.len() as u32 - 1))
     }
 
@@ -198,6 +202,7 @@ impl SceneBuilder {
             geometry: Arc::new(geometry),
             materials,
             material_names,
+            textures: self.textures,
             lights,
             light_names,
             cameras,

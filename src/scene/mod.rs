@@ -15,6 +15,7 @@ use crate::lights::Light;
 use crate::materials::{Bsdf, Material, TransportMode};
 use crate::math::{Aabb, DVec3};
 use crate::sampling::Discrete;
+use crate::textures::Texture;
 
 /// Everything that is rendered.
 pub struct Scene {
@@ -24,6 +25,8 @@ pub struct Scene {
     pub materials: Vec<Box<dyn Material>>,
     /// Names of the materials, for reports.
     pub material_names: Vec<String>,
+    /// The textures of all materials. Without any, nobody needs footprints.
+    pub textures: Vec<Texture>,
     /// Lights, named by [`LightId`].
     pub lights: Vec<Box<dyn Light>>,
     /// Names and kinds of the lights, for reports.
@@ -51,6 +54,13 @@ impl Scene {
     #[inline]
     pub fn light(&self, id: LightId) -> &dyn Light {
         &*self.lights[id.index()]
+    }
+
+    /// Makes the smaller sizes of all textures, on all threads.
+    pub fn prepare_textures(&self) {
+        for t in &self.textures {
+            t.image.prepare(t.content);
+        }
     }
 
     /// Total emitted flux in W.

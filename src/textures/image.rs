@@ -2,6 +2,7 @@
 
 use std::sync::{LazyLock, OnceLock};
 
+use super::pyramid::Pyramid;
 use crate::color::srgb_to_linear;
 
 /// What the numbers of an image mean. The image itself does not know: one image can serve as
@@ -69,6 +70,8 @@ pub struct Image {
     texels: Texels,
     /// Smallest and largest number of each channel as stored.
     extremes: OnceLock<[[f64; 4]; 2]>,
+    /// Smaller sizes, by what the numbers mean.
+    pyramids: [OnceLock<Pyramid>; 4],
 }
 
 impl Image {
@@ -91,6 +94,7 @@ impl Image {
             channels,
             texels,
             extremes: OnceLock::new(),
+            pyramids: Default::default(),
         })
     }
 
@@ -102,6 +106,7 @@ impl Image {
             channels: 1,
             texels: Texels::U8(vec![255]),
             extremes: OnceLock::new(),
+            pyramids: Default::default(),
         }
     }
 
@@ -140,15 +145,13 @@ impl Image {
     /// alpha.
     #[inline]
     pub fn texel(&self, x: u32, y: u32, content: Content) -> [f64; 4] {
-        self.at(
-            y as usize * self.width as usize + x as usize,
-            content.is_srgb(),
-        )
+        self.at(y as usize * self.width as usize + x as usize, content)
     }
 
     /// The texel of index `i`.
     #[inline]
-    pub(super) fn at(&self, i: usize, srgb: bool) -> [f64; 4] {
+    pub(super) fn at(&self, i: usize, content: Content) -> [f64; 4] {
+        let srgb = content.is_srgb();
         let i = i * self.channels;
         match &self.texels {
             Texels::U8(v) => {
@@ -206,12 +209,29 @@ impl Image {
         }
     }
 
+    /// The smaller sizes, made when they are first asked for, by one thread: others wait. (It
+    /// must not share the work. A thread that waits for its share may be given another task that
+    /// asks for the same sizes.)
+    #[inline]
+    pub(super) fn pyramid(&self, content: Content) -> &Pyramid {
+        self.pyramids[content as usize].get_or_init(|| Pyramid::new(self, content, false))
+    }
+
+    /// Makes the smaller sizes beforehand, on all threads.
+    pub fn prepare(&self, content: Content) {
+        let slot = &self.pyramids[content as usize];
+        if slot.get().is_none() {
+            // If another thread was faster, both made the same.
+            let _ = slot.set(Pyramid::new(self, content, true));
+        }
+    }
+
     /// Mean over all texels, linear.
     pub fn mean(&self, content: Content) -> [f64; 4] {
         let n = self.texels.len() / self.channels;
         let mut sum = [0.0; 4];
         for i in 0..n {
-            for (s, x) in sum.iter_mut().zip(self.at(i, content.is_srgb())) {
+            for (s, x) in sum.iter_mut().zip(self.at(i, content)) {
                 *s += x;
             }
         }
@@ -223,7 +243,7 @@ impl Image {
         let extremes = self.extremes.get_or_init(|| {
             let mut range = [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
             for i in 0..self.texels.len() / self.channels {
-                for (k, x) in self.at(i, false).into_iter().enumerate() {
+                for (k, x) in self.at(i, Content::Data).into_iter().enumerate() {
                     range[0][k] = range[0][k].min(x);
                     range[1][k] = range[1][k].max(x);
                 }

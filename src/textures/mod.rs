@@ -1,7 +1,9 @@
 //! Textures: images over a surface. They answer what colour a surface point has, and never
 //! read files.
 
+mod filter;
 mod image;
+mod pyramid;
 mod sampler;
 mod texture;
 

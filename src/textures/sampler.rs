@@ -13,6 +13,21 @@ pub enum Wrap {
 }
 
 impl Wrap {
+    /// The coordinate near the image, in units of its size, that shows the same as `u`; 0 for
+    /// what is not a number.
+    #[inline]
+    pub fn fold(self, u: f64) -> f64 {
+        if !u.is_finite() {
+            return 0.0;
+        }
+        match self {
+            Self::Repeat => u - u.floor(),
+            Self::Mirror => u - 2.0 * (0.5 * u).floor(),
+            // Blends reach no further than an image's width beyond the border.
+            Self::Clamp => u.clamp(-1.0, 2.0),
+        }
+    }
+
     /// The texel that stands for texel `i` of `n`.
     #[inline]
     pub fn index(self, i: i64, n: u32) -> u32 {
@@ -29,7 +44,7 @@ impl Wrap {
     }
 }
 
-/// What lies between texels.
+/// How an image is magnified: what lies between its texels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filter {
     /// The nearest texel.

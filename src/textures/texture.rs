@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Content, Filter, Image, Sampler};
+use super::{Content, Image, Sampler};
 use crate::geometry::Surface;
 
 /// An affine map of texture coordinates (`KHR_texture_transform`).
@@ -85,34 +85,20 @@ impl Texture {
     }
 
     /// The value at texture coordinates, before the transform. The footprint is how they change
-    /// per pixel to the right and down.
-    pub fn lookup(&self, uv: [f64; 2], _footprint: Option<[[f64; 2]; 2]>) -> [f64; 4] {
+    /// per pixel to the right and down; without one the value is that of the point alone. What
+    /// is not a number counts as 0.
+    pub fn lookup(&self, uv: [f64; 2], footprint: Option<[[f64; 2]; 2]>) -> [f64; 4] {
         let [u, v] = self.transform.map_or(uv, |t| t.apply(uv));
-        let (w, h) = (self.image.width(), self.image.height());
-        let wrap = |x: i64, y: i64| {
-            self.image.texel(
-                self.sampler.wrap_u.index(x, w),
-                self.sampler.wrap_v.index(y, h),
-                self.content,
-            )
-        };
-        let (x, y) = (u * f64::from(w), v * f64::from(h));
-        if self.sampler.filter == Filter::Nearest {
-            return wrap(x.floor() as i64, y.floor() as i64);
+        // Near the image, so that integers hold the coordinates however far out they were.
+        let uv = [self.sampler.wrap_u.fold(u), self.sampler.wrap_v.fold(v)];
+        match footprint {
+            None => self.point(uv),
+            Some(f) => {
+                let f = self
+                    .transform
+                    .map_or(f, |t| f.map(|d| t.apply_difference(d)));
+                self.filtered(uv, f)
+            }
         }
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (fx, fy) = (x - x.floor(), y - y.floor());
-        let (x, y) = (x.floor() as i64, y.floor() as i64);
-        let (a, b, c, d) = (
-            wrap(x, y),
-            wrap(x.saturating_add(1), y),
-            wrap(x, y.saturating_add(1)),
-            wrap(x.saturating_add(1), y.saturating_add(1)),
-        );
-        std::array::from_fn(|k| {
-            let top = a[k] + (b[k] - a[k]) * fx;
-            let bottom = c[k] + (d[k] - c[k]) * fx;
-            top + (bottom - top) * fy
-        })
     }
 }

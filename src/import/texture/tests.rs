@@ -303,3 +303,35 @@ fn broken_ktx2_is_refused_and_foreign_kinds_are_left_out() {
         );
     }
 }
+
+/// Files of 8 × 8 texels that the reference encoder of Basis Universal wrote: left (200, 60, 20),
+/// right (20, 120, 220), with an alpha of 128 in the lower half where there is one.
+#[cfg(feature = "ktx2")]
+#[test]
+fn basis_universal_is_transcoded() {
+    let files: [(&[u8], bool); 3] = [
+        (include_bytes!("../../../tests/data/etc1s.ktx2"), false),
+        (include_bytes!("../../../tests/data/etc1s_alpha.ktx2"), true),
+        (include_bytes!("../../../tests/data/uastc.ktx2"), true),
+    ];
+    for (bytes, alpha) in files {
+        let image = decoded(bytes);
+        assert_eq!((image.width(), image.height()), (8, 8));
+        for (x, y) in [(0, 0), (7, 0), (3, 7), (4, 7)] {
+            let color = if x < 4 { [200, 60, 20] } else { [20, 120, 220] };
+            let [r, g, b] = color.map(|c| f64::from(c) / 255.0);
+            let a = if alpha && y >= 4 { 128.0 / 255.0 } else { 1.0 };
+            for (got, want) in image.texel(x, y, Content::Data).iter().zip([r, g, b, a]) {
+                assert!((got - want).abs() < 0.04, "{x} {y}: {got} {want}");
+            }
+        }
+        for n in 0..bytes.len() {
+            let json = document(json!({"uri": uri(&bytes[..n])}));
+            assert!(
+                !matches!(load(&json, &[]), Ok(Some(_))),
+                "{n} bytes of {}",
+                bytes.len()
+            );
+        }
+    }
+}
