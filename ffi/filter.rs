@@ -90,6 +90,7 @@ pub(super) fn install(geometry: RTCGeometry, filter: &Arc<Filter>) {
 }
 
 /// Called by Embree for a hit of a geometry with a filter.
+// SAFETY: only Embree calls it, with arguments that it made.
 unsafe extern "C" fn on_hit(args: *const RTCFilterFunctionNArguments) {
     // SAFETY: Embree passes a pointer to arguments that live during the call.
     let args = unsafe { &*args };
