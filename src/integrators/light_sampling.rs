@@ -1,7 +1,7 @@
 //! Next-event estimation: a sample of direct light at a surface point.
 
 use super::RenderContext;
-use crate::geometry::{LightId, Ray, SurfacePoint};
+use crate::geometry::{Ray, SurfacePoint};
 use crate::materials::{Bsdf, BsdfValue};
 
 /// The power heuristic with exponent 2 (Veach 1997, 9.2.4) for `na` samples of density `a`
@@ -38,8 +38,8 @@ pub(super) fn sample_direct(
     n_light: f64,
     n_bsdf: f64,
 ) -> Option<DirectSample> {
-    let (i, p_pick, rest) = cx.scene.choose_light.sample(u[0])?;
-    let light = cx.scene.light(LightId(i as u32));
+    let (id, p_pick, rest) = cx.scene.pick_light(sp.p, u[0])?;
+    let light = cx.scene.light(id);
     let li = light.sample_li(sp.p, [rest, u[1]])?;
     let pdf = li.pdf * p_pick;
     let x = pdf * n_light;

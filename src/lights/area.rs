@@ -2,10 +2,12 @@
 
 use std::f64::consts::PI;
 
-use super::{EmissionMap, EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
+use super::{
+    EmissionMap, EmissionOrigin, LiSample, Light, LightDesc, LightEntry, surface_importance,
+};
 use crate::color::Rgb;
 use crate::geometry::{Surface, SurfacePoint};
-use crate::math::{DVec3, Frame, max_abs, robust};
+use crate::math::{Aabb, BoundingSphere, DVec3, Frame, max_abs, robust};
 use crate::sampling::{Discrete, warp};
 
 struct Triangle {
@@ -24,6 +26,9 @@ struct AreaLight {
     choose: Discrete,
     area: f64,
     map: Option<Mapped>,
+    around: BoundingSphere,
+    /// Luminance of the flux of one side.
+    flux: f64,
 }
 
 /// What a light with a map needs beside it.
@@ -68,6 +73,10 @@ impl Light for AreaLight {
         let sides = if self.double_sided { 2.0 } else { 1.0 };
         let mean = self.map.as_ref().map_or(Rgb::ONE, |m| m.mean);
         self.radiance * mean * (PI * self.area * sides)
+    }
+
+    fn importance(&self, p: DVec3) -> f64 {
+        surface_importance(self.flux, &self.around, p)
     }
 
     #[inline]
@@ -236,7 +245,14 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
             mean,
         }
     });
+    let mut around = Aabb::EMPTY;
+    for p in d.triangles.iter().flatten() {
+        around.grow(*p);
+    }
+    let mean = map.as_ref().map_or(Rgb::ONE, |m: &Mapped| m.mean);
     Ok(Box::new(AreaLight {
+        around: around.bounding_sphere(),
+        flux: (d.strength * mean).luminance() * PI * area,
         radiance: d.strength,
         double_sided: d.double_sided,
         triangles,

@@ -20,6 +20,10 @@ impl Light for DirectionalLight {
         self.irradiance * (PI * self.scene.radius * self.scene.radius)
     }
 
+    fn importance(&self, _p: DVec3) -> f64 {
+        self.irradiance.luminance()
+    }
+
     fn sample_li(&self, _p: DVec3, _u: [f64; 2]) -> Option<LiSample> {
         Some(LiSample {
             wi: -self.frame.z,

@@ -15,7 +15,7 @@ pub use desc::{EmissionMap, LightDesc};
 
 use crate::color::Rgb;
 use crate::geometry::{Ray, Surface, SurfacePoint};
-use crate::math::DVec3;
+use crate::math::{BoundingSphere, DVec3};
 
 /// A sample of the light that arrives at a point.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +72,10 @@ pub trait Light: Send + Sync {
     /// Emitted flux in W; for parallel light that through the scene's disc.
     fn power(&self) -> Rgb;
 
+    /// A guess of the luminance that would arrive at `p` if nothing stood between, W/m² or in
+    /// proportion to it: lights are chosen by it. Zero only where the light cannot contribute.
+    fn importance(&self, p: DVec3) -> f64;
+
     /// Samples the light that arrives at `p`; `None` where none can.
     fn sample_li(&self, p: DVec3, u: [f64; 2]) -> Option<LiSample>;
 
@@ -97,6 +101,14 @@ pub trait Light: Send + Sync {
     /// What leaves `from` along the unit direction `dir`: radiance times cosine in W/(m²·sr) for
     /// a surface, intensity in W/sr for a point.
     fn emitted(&self, from: &EmissionOrigin, dir: DVec3) -> Rgb;
+}
+
+/// The [`Light::importance`] of a surface of a given flux within a sphere: that of its middle,
+/// and no more than at its rim.
+fn surface_importance(flux: f64, around: &BoundingSphere, p: DVec3) -> f64 {
+    let d2 = (p - around.center).length_squared();
+    let r2 = around.radius * around.radius;
+    flux / (std::f64::consts::PI * d2.max(r2).max(f64::MIN_POSITIVE))
 }
 
 /// A light kind that can be chosen.

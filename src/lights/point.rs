@@ -45,6 +45,10 @@ impl Light for PointLight {
         self.intensity * (4.0 * PI)
     }
 
+    fn importance(&self, p: DVec3) -> f64 {
+        self.intensity.luminance() / (p - self.position).length_squared()
+    }
+
     fn sample_li(&self, p: DVec3, _u: [f64; 2]) -> Option<LiSample> {
         sample_point(self.position, p, self.intensity)
     }

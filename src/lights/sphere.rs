@@ -2,16 +2,17 @@
 
 use std::f64::consts::PI;
 
-use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
+use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry, surface_importance};
 use crate::color::Rgb;
 use crate::geometry::{Surface, SurfacePoint};
-use crate::math::{BoundingSphere, DVec3, Frame, max_abs, robust};
+use crate::math::{Aabb, BoundingSphere, DVec3, Frame, max_abs, robust};
 use crate::sampling::{Discrete, warp};
 
 struct SphereLight {
     radiance: Rgb,
     spheres: Vec<BoundingSphere>,
     choose: Discrete,
+    around: BoundingSphere,
 }
 
 /// `1 − cos θ_max` of the cone that `s` fills seen from outside at squared distance `d2`.
@@ -46,6 +47,10 @@ impl SphereLight {
 impl Light for SphereLight {
     fn power(&self) -> Rgb {
         self.radiance * (PI * self.choose.total())
+    }
+
+    fn importance(&self, p: DVec3) -> f64 {
+        surface_importance(self.power().luminance(), &self.around, p)
     }
 
     fn sample_li(&self, p: DVec3, u: [f64; 2]) -> Option<LiSample> {
@@ -128,7 +133,15 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
     if choose.is_empty() {
         return Err("its spheres have no area".into());
     }
+    let mut around = Aabb::EMPTY;
+    for s in &d.spheres {
+        around = around.union(Aabb {
+            min: s.center - s.radius,
+            max: s.center + s.radius,
+        });
+    }
     Ok(Box::new(SphereLight {
+        around: around.bounding_sphere(),
         radiance: d.strength,
         spheres: d.spheres.clone(),
         choose,

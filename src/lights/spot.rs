@@ -48,6 +48,12 @@ impl Light for SpotLight {
         self.intensity * (2.0 * PI * (core + ramp))
     }
 
+    fn importance(&self, p: DVec3) -> f64 {
+        let to = p - self.position;
+        let dir = to.normalize_or_zero();
+        self.toward(dir).luminance() / to.length_squared()
+    }
+
     fn sample_li(&self, p: DVec3, _u: [f64; 2]) -> Option<LiSample> {
         let dir = (p - self.position).try_normalize()?;
         sample_point(self.position, p, self.toward(dir))

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use super::Scene;
+use super::{LightChoice, Scene};
 use crate::cameras::CameraDesc;
 use crate::color::Rgb;
 use crate::error::{Error, Result};
@@ -20,7 +20,6 @@ use crate::lights::{EmissionMap, LightDesc, LightEntry};
 use crate::materials::{Material, MaterialDesc, MaterialEntry};
 use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3, Vec3};
 use crate::registry::Table;
-use crate::sampling::Discrete;
 use crate::textures::Texture;
 
 /// The plugin tables that a scene is built with.
@@ -198,7 +197,7 @@ impl SceneBuilder {
             material_names.push(name);
         }
         Ok(Scene {
-            choose_light: Discrete::new(lights.iter().map(|l| l.power().luminance())),
+            choose_light: LightChoice::new(&lights),
             geometry: Arc::new(geometry),
             materials,
             material_names,

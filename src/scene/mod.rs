@@ -2,9 +2,11 @@
 
 mod builder;
 mod census;
+mod light_choice;
 
 pub use builder::{Emission, MeshPlacement, SceneBuilder, ScenePlugins};
 pub use census::Census;
+pub use light_choice::LightChoice;
 
 use std::sync::Arc;
 
@@ -14,7 +16,6 @@ use crate::geometry::{Footprint, Geometry, LightId, MaterialId, Ray, Surface, Su
 use crate::lights::Light;
 use crate::materials::{Bsdf, Material, TransportMode};
 use crate::math::{Aabb, DVec3};
-use crate::sampling::Discrete;
 use crate::textures::Texture;
 
 /// Everything that is rendered.
@@ -31,8 +32,8 @@ pub struct Scene {
     pub lights: Vec<Box<dyn Light>>,
     /// Names and kinds of the lights, for reports.
     pub light_names: Vec<(String, &'static str)>,
-    /// How often each light is chosen, by flux.
-    pub choose_light: Discrete,
+    /// How lights are chosen for a shading point.
+    pub choose_light: LightChoice,
     /// Cameras, in the order of the file.
     pub cameras: Vec<CameraDesc>,
     /// World-space box of the geometry, after recentring.
@@ -104,8 +105,18 @@ impl Scene {
     #[inline]
     pub fn pdf_light(&self, from: DVec3, on: &SurfacePoint) -> f64 {
         on.light.map_or(0.0, |id| {
-            self.light(id).pdf_li(from, on) * self.choose_light.probability(id.index())
+            let pick = self
+                .choose_light
+                .probability(&self.lights, from, id.index());
+            self.light(id).pdf_li(from, on) * pick
         })
+    }
+
+    /// Chooses a light for a shading point by `u`: which, its probability, and `u` rescaled.
+    #[inline]
+    pub fn pick_light(&self, p: DVec3, u: f64) -> Option<(LightId, f64, f64)> {
+        let (i, pdf, rest) = self.choose_light.sample(&self.lights, p, u)?;
+        Some((LightId(i as u32), pdf, rest))
     }
 
     /// Share of the light that survives the segment of `ray` that ended at `sp`, if it ran

@@ -1,0 +1,98 @@
+//! Which light a shading point samples.
+
+use arrayvec::ArrayVec;
+
+use crate::lights::Light;
+use crate::math::DVec3;
+use crate::sampling::Discrete;
+
+/// Most lights that are weighed one by one at every point. More are chosen by their flux.
+const MOST_WEIGHED: usize = 64;
+
+/// Share of the choice that is even over the lights that can contribute: what a guess without
+/// visibility takes for faint may be all that arrives.
+const EVEN: f64 = 0.1;
+
+/// Chooses lights by what they would bring to a point if nothing stood between.
+#[derive(Clone, Debug, Default)]
+pub struct LightChoice {
+    by_flux: Discrete,
+    n: usize,
+}
+
+/// Probabilities of all lights at one point.
+type Weights = ArrayVec<f64, MOST_WEIGHED>;
+
+impl LightChoice {
+    /// The choice among `lights`.
+    pub fn new(lights: &[Box<dyn Light>]) -> Self {
+        Self {
+            by_flux: Discrete::new(lights.iter().map(|l| l.power().luminance())),
+            n: lights.len(),
+        }
+    }
+
+    /// Probabilities at `p`; `None` if no light reaches it.
+    fn weights(&self, lights: &[Box<dyn Light>], p: DVec3) -> Option<Weights> {
+        let mut w: Weights = lights.iter().map(|l| l.importance(p)).collect();
+        let (mut sum, mut able) = (0.0, 0u32);
+        for x in &mut w {
+            if !(*x > 0.0) {
+                *x = 0.0;
+                continue;
+            }
+            // At a light's very place the guess has no bound.
+            *x = x.min(1e30);
+            sum += *x;
+            able += 1;
+        }
+        if able == 0 {
+            return None;
+        }
+        let even = EVEN / f64::from(able);
+        for x in &mut w {
+            if *x > 0.0 {
+                *x = (1.0 - EVEN) * *x / sum + even;
+            }
+        }
+        Some(w)
+    }
+
+    /// The light chosen by `u` at `p`, its probability, and `u` rescaled to `[0, 1)`.
+    #[inline]
+    pub fn sample(&self, lights: &[Box<dyn Light>], p: DVec3, u: f64) -> Option<(usize, f64, f64)> {
+        if self.n == 1 {
+            return Some((0, 1.0, u));
+        }
+        if self.n > MOST_WEIGHED {
+            return self.by_flux.sample(u);
+        }
+        let weights = self.weights(lights, p)?;
+        let mut rest = u;
+        let mut last = None;
+        for (i, &w) in weights.iter().enumerate() {
+            if w == 0.0 {
+                continue;
+            }
+            last = Some((i, w));
+            if rest < w {
+                break;
+            }
+            rest -= w;
+        }
+        let (i, w) = last?;
+        Some((i, w, (rest / w).clamp(0.0, 1.0 - f64::EPSILON)))
+    }
+
+    /// Probability that light `i` is chosen at `p`.
+    #[inline]
+    pub fn probability(&self, lights: &[Box<dyn Light>], p: DVec3, i: usize) -> f64 {
+        if self.n == 1 {
+            return 1.0;
+        }
+        if self.n > MOST_WEIGHED {
+            return self.by_flux.probability(i);
+        }
+        self.weights(lights, p).map_or(0.0, |w| w[i])
+    }
+}
