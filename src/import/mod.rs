@@ -13,6 +13,7 @@ mod ktx2;
 mod material;
 mod mesh;
 mod node;
+mod tangents;
 mod texture;
 mod used;
 

@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use super::accessor::Source;
 use super::json::Cursor;
-use super::{ImportOptions, Notes, Problem, mesh};
+use super::{ImportOptions, Notes, Problem, mesh, tangents};
 use crate::cameras::CameraDesc;
 use crate::color::{Rgb, units};
-use crate::geometry::{MaterialId, ShapeId, SphereSet};
+use crate::geometry::{MaterialId, ShapeId, SphereSet, TriangleMesh};
 use crate::lights::LightDesc;
 use crate::math::{DAffine3, DMat4, DQuat, DVec3};
 use crate::scene::{MeshPlacement, SceneBuilder};
@@ -114,13 +114,27 @@ impl<'a> Walker<'a, '_> {
                     .get(m.index()?)
                     .ok_or_else(|| m.problem("names a material that does not exist"))?,
             };
-            if let Some(triangles) = mesh::read(&p, self.source, self.notes)? {
+            if let Some(mut triangles) = mesh::read(&p, self.source, self.notes)? {
+                self.complete(&mut triangles, &p)?;
                 let shape = self.builder.add_mesh(triangles, &mesh.name());
                 parts.push((shape, material));
             }
         }
         self.meshes.insert(index, parts.clone());
         Ok(parts)
+    }
+
+    /// Adds the tangents that the material of a primitive needs.
+    fn complete(&mut self, triangles: &mut TriangleMesh, p: &Cursor<'a>) -> Result<(), Problem> {
+        if let Some(m) = p.get("material") {
+            let material = self.source.root.element("materials", m.index()?, &m)?;
+            if let Some(set) = tangents::wanted(&material)? {
+                if !tangents::complete(triangles, set) {
+                    self.notes.add(tangents::CROWDED, 1);
+                }
+            }
+        }
+        Ok(())
     }
 
     fn light(&mut self, at: &Cursor<'a>, name: String, world: DAffine3) -> Result<(), Problem> {
