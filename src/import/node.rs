@@ -128,10 +128,9 @@ impl<'a> Walker<'a, '_> {
     fn complete(&mut self, triangles: &mut TriangleMesh, p: &Cursor<'a>) -> Result<(), Problem> {
         if let Some(m) = p.get("material") {
             let material = self.source.root.element("materials", m.index()?, &m)?;
-            if let Some(set) = tangents::wanted(&material)? {
-                if !tangents::complete(triangles, set) {
-                    self.notes.add(tangents::CROWDED, 1);
-                }
+            let set = tangents::wanted(&material)?;
+            if set.is_some_and(|set| !tangents::complete(triangles, set)) {
+                self.notes.add(tangents::CROWDED, 1);
             }
         }
         Ok(())
