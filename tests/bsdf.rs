@@ -240,6 +240,34 @@ fn no_surface_returns_more_than_it_gets() {
 }
 
 #[test]
+fn white_plastic_returns_all_light() {
+    // What the layer does not reflect the white base does, at every angle: E + (1 − E).
+    let entry = dualight::materials::MATERIALS.last().expect("pbr");
+    for roughness in [0.0, 0.05, 0.3, 0.6, 1.0] {
+        for diffuse_transmission in [0.0, 0.5] {
+            let desc = MaterialDesc {
+                metallic: 0.0,
+                roughness,
+                diffuse_transmission,
+                ..Default::default()
+            };
+            let s = Specimen {
+                name: "white plastic".into(),
+                material: (entry.build)(&desc).expect("valid"),
+                desc,
+                both_sides: false,
+            };
+            for cos in [1.0, 0.8, 0.5, 0.2, 0.05, 0.01] {
+                let [a, ..] = albedo(&s, direction(cos, 0.4), TransportMode::Importance, 4000);
+                let what = format!("white plastic of roughness {roughness} at {cos}");
+                // The table of albedos is good to about this.
+                a.assert_mean_with_bias(&what, 1.0, 0.01, 4e-3);
+            }
+        }
+    }
+}
+
+#[test]
 fn smooth_glass_divides_its_light_exactly() {
     for s in specimens(&[]).iter().filter(|s| s.both_sides) {
         for cos in COSINES.into_iter().chain(COSINES.map(|c| -c)) {

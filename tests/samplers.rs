@@ -18,7 +18,7 @@ use dualight::sampling::{Rng, warp};
 const COS_CELLS: usize = 12;
 const PHI_CELLS: usize = 16;
 /// χ² tests in this file, at most.
-const TESTS: f64 = 80.0;
+const TESTS: f64 = 140.0;
 
 /// Compares samples with a density over the sphere of directions. `sample` may fail, which
 /// counts as probability outside of the sphere.
@@ -67,10 +67,10 @@ fn chi2(name: &str, sample: impl Fn(&mut Rng) -> Option<DVec3>, pdf: impl Fn(DVe
         cells += 1.0;
     }
     assert!(total < 1.01, "{name}: the density integrates to {total}");
-    // Wilson and Hilferty's normal approximation of χ²; z of 0.01 / 80 is 3.66.
+    // Wilson and Hilferty's normal approximation of χ²; z of 0.01 / 140 is 3.80.
     let k: f64 = f64::max(cells - 1.0, 1.0);
     let z = ((chi / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
-    let limit = 3.66;
+    let limit = 3.80;
     assert!(
         z < limit,
         "{name}: χ² {chi:.1} over {cells} cells, z {z:.2} (of {TESTS} tests)"
@@ -120,9 +120,50 @@ fn descs() -> Vec<(String, MaterialDesc)> {
             format!("half metal {r}"),
             rough(MaterialDesc {
                 metallic: 0.5,
-                ..plastic
+                ..plastic.clone()
             }),
         ));
+        if r == 1.0 {
+            continue;
+        }
+        let layered = [
+            MaterialDesc {
+                name: "coated".into(),
+                clearcoat: 0.9,
+                clearcoat_roughness: 0.4,
+                ..plastic.clone()
+            },
+            MaterialDesc {
+                name: "velvet".into(),
+                sheen_color: Rgb::splat(0.8),
+                sheen_roughness: r,
+                ..plastic.clone()
+            },
+            MaterialDesc {
+                name: "brushed".into(),
+                anisotropy: 0.7,
+                ..mirror()
+            },
+            MaterialDesc {
+                name: "soap".into(),
+                iridescence: 1.0,
+                ..plastic.clone()
+            },
+            MaterialDesc {
+                name: "leaf, of both sides like glass".into(),
+                diffuse_transmission: 0.5,
+                ..plastic.clone()
+            },
+            MaterialDesc {
+                name: "frosted glass pane".into(),
+                transmission: 1.0,
+                specular: 0.8,
+                ..plastic
+            },
+        ];
+        for d in layered {
+            out.push((format!("{} {r}", d.name), rough(d)));
+        }
     }
     out
 }

@@ -13,8 +13,8 @@ use crate::math::DVec3;
 
 /// Nodes over the square root of the cosine, which are denser toward grazing angles.
 const COSINES: usize = 49;
-/// Nodes over roughness.
-const ROUGHNESSES: usize = 17;
+/// Nodes over the square root of roughness: smooth layers change fastest.
+const ROUGHNESSES: usize = 25;
 /// Points of the quadrature per node and axis.
 const POINTS: u32 = 16;
 
@@ -53,7 +53,7 @@ impl Table {
         let at: [[f64; COSINES]; ROUGHNESSES] = std::array::from_fn(|j| {
             std::array::from_fn(|i| {
                 let s = node(i, COSINES);
-                f((s * s).max(1e-4), node(j, ROUGHNESSES))
+                f((s * s).max(1e-4), node(j, ROUGHNESSES).powi(2))
             })
         });
         // ∫ 2 μ E dμ with μ = s²: 4 s³ ds, by Simpson's rule over pairs of intervals.
@@ -157,7 +157,7 @@ impl LayerAlbedo {
     #[inline]
     pub(super) fn new(roughness: f64, f0: f64, f90: f64, share: f64) -> Self {
         Self {
-            row: Between::new(roughness, ROUGHNESSES),
+            row: Between::new(roughness.sqrt(), ROUGHNESSES),
             f0: f0 * share,
             f90: f90 * share,
         }
@@ -188,7 +188,7 @@ pub(super) struct SheenAlbedo {
 impl SheenAlbedo {
     pub(super) fn new(roughness: f64, strength: f64) -> Self {
         Self {
-            row: Between::new(roughness, ROUGHNESSES),
+            row: Between::new(roughness.sqrt(), ROUGHNESSES),
             strength,
         }
     }
