@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use crate::cameras::framing;
 use crate::control::{Control, Stopped};
 use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
@@ -205,10 +206,20 @@ fn choose_camera(
     settings: &RenderSettings,
     registry: &Registry,
 ) -> Result<Box<dyn crate::cameras::Camera>> {
+    let aspect = f64::from(settings.width) / f64::from(settings.height);
+    let auto;
     let desc = match &settings.camera {
         None => scene.cameras.first().ok_or_else(|| {
-            Error::Usage("the scene has no camera; add one and export it with the scene".into())
+            Error::Usage(
+                "the scene has no camera; add one and export it with the scene, or let \
+                 --camera auto frame it"
+                    .into(),
+            )
         })?,
+        Some(name) if name == "auto" && scene.cameras.iter().all(|c| c.name != "auto") => {
+            auto = framing(&scene.bounds.bounding_sphere(), aspect);
+            &auto
+        }
         Some(name) => scene
             .cameras
             .iter()
@@ -224,7 +235,6 @@ fn choose_camera(
                     .join(", "),
             })?,
     };
-    let aspect = f64::from(settings.width) / f64::from(settings.height);
     let entry = registry.cameras.find(desc.kind)?;
     (entry.build)(desc, aspect).map_err(|e| Error::Usage(format!("camera '{}': {e}", desc.name)))
 }

@@ -1,7 +1,10 @@
 //! Cameras: rays for points of the image. A camera kind is one file and one line in [`CAMERAS`].
 
+mod framing;
 mod orthographic;
 mod perspective;
+
+pub use framing::framing;
 
 use crate::math::{DAffine3, DVec3};
 

@@ -117,7 +117,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", default_value = "16", value_parser = values::positive_u32)]
     #[arg(help_heading = "Image")]
     pub spp: u32,
-    /// Camera to look through [default: the first of the scene]
+    /// Camera to look through; auto frames the whole scene [default: the first of the scene]
     #[arg(long, value_name = "NAME", help_heading = "Image")]
     pub camera: Option<String>,
     /// Render only the pixels from X0,Y0 (upper left) to just before X1,Y1; the rest is black
