@@ -160,6 +160,7 @@ fn render_in_pool(
         &*integrator,
         options.seed,
         settings.spp,
+        !scene.textures.is_empty(),
         region,
         &mut film,
         control,

@@ -5,6 +5,7 @@
 //! is then recomputed in `f64` on that one primitive, by the same code for every backend.
 
 mod coverage;
+mod differential;
 mod hit;
 mod mesh;
 mod object;
@@ -15,6 +16,7 @@ mod surface_point;
 pub mod triangle;
 
 pub use coverage::{Coverage, CoverageQuery, ray_key};
+pub use differential::{Differential, Landing};
 pub use hit::Hit;
 pub use mesh::{Invalid, TriangleMesh};
 pub use object::{Geometry, Object, Placement, Shape, SphereSet};

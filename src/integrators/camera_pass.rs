@@ -6,11 +6,10 @@
 
 use rayon::prelude::*;
 
-use super::{Integrator, Scratch};
+use super::{Integrator, Scratch, Spacing};
 use crate::cameras::Camera;
 use crate::control::Control;
 use crate::film::{Film, PixelSample, Tile};
-use crate::geometry::Ray;
 use crate::sampling::{Sampler, stream};
 use crate::stats::RayCounts;
 
@@ -46,12 +45,14 @@ impl Region {
 }
 
 /// Takes `spp` samples in every pixel of `region` and adds them to the film, until done or
-/// stopped. Returns the rays traced.
+/// stopped. Rays carry differentials if `differentials` are wanted. Returns the rays traced.
+#[expect(clippy::too_many_arguments, reason = "plain input, each used once")]
 pub fn camera_pass(
     camera: &dyn Camera,
     integrator: &dyn Integrator,
     seed: u64,
     spp: u32,
+    differentials: bool,
     region: Region,
     film: &mut Film,
     control: &Control,
@@ -60,6 +61,7 @@ pub fn camera_pass(
     let stage = control.stage("pixels", "samples", pixels * u64::from(spp));
     let tiles = region.tiles();
     let (width, height) = (film.width(), film.height());
+    let spacing = Spacing::new(width, height, spp);
     let mut rays = RayCounts::default();
     let mut done = 0;
     while done < spp && control.stopped().is_none() {
@@ -82,12 +84,9 @@ pub fn camera_pass(
                                 let mut sampler =
                                     Sampler::new(seed, stream::CAMERA, key, u64::from(s));
                                 let [jx, jy] = sampler.next_2d();
-                                let (o, d) = camera.ray(
-                                    (f64::from(px) + jx) / f64::from(width),
-                                    (f64::from(py) + jy) / f64::from(height),
-                                );
+                                let (x, y) = (f64::from(px) + jx, f64::from(py) + jy);
                                 integrator.sample(
-                                    Ray::new(o, d),
+                                    spacing.camera_ray(camera, x, y, differentials),
                                     &mut sampler,
                                     &mut sum,
                                     &mut scratch,

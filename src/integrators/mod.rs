@@ -2,6 +2,7 @@
 //! one line in [`INTEGRATORS`].
 
 mod camera_pass;
+mod footprint;
 mod light_sampling;
 mod path;
 mod photon;
@@ -9,12 +10,13 @@ mod settings;
 mod stored_light;
 
 pub use camera_pass::{Region, camera_pass};
+pub use footprint::Spacing;
 pub use settings::IntegratorSettings;
 
 use crate::accel::Accelerator;
 use crate::effects::EffectSet;
 use crate::film::PixelSample;
-use crate::geometry::Ray;
+use crate::geometry::{Differential, Ray};
 use crate::photons::PhotonMaps;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
@@ -38,7 +40,22 @@ pub struct RenderContext<'a> {
 /// Estimates radiance along camera rays.
 pub trait Integrator: Send + Sync {
     /// Adds the sample of one camera ray to `out`; `scratch` is the calling thread's own.
-    fn sample(&self, ray: Ray, sampler: &mut Sampler, out: &mut PixelSample, scratch: &mut Scratch);
+    fn sample(
+        &self,
+        camera: CameraRay,
+        sampler: &mut Sampler,
+        out: &mut PixelSample,
+        scratch: &mut Scratch,
+    );
+}
+
+/// A ray from the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRay {
+    /// The ray.
+    pub ray: Ray,
+    /// How it changes with the pixel; `None` where no texture asks for it.
+    pub differential: Option<Differential>,
 }
 
 /// What a thread keeps between samples.

@@ -3,11 +3,11 @@
 //!
 //! Source: Kajiya, *The Rendering Equation*, 1986; Veach 1997, chapters 8 to 10.
 
+use super::footprint::Trail;
 use super::light_sampling::{power_heuristic, sample_direct};
-use super::{Integrator, IntegratorEntry, RenderContext, Scratch};
+use super::{CameraRay, Integrator, IntegratorEntry, RenderContext, Scratch};
 use crate::color::Rgb;
 use crate::film::{Component, PixelSample};
-use crate::geometry::Ray;
 use crate::materials::{LobeClass, TransportMode};
 use crate::sampling::Sampler;
 
@@ -70,13 +70,17 @@ struct Path<'a> {
 impl Integrator for Path<'_> {
     fn sample(
         &self,
-        mut ray: Ray,
+        camera: CameraRay,
         sampler: &mut Sampler,
         out: &mut PixelSample,
         scratch: &mut Scratch,
     ) {
         let cx = &self.cx;
         let max_depth = cx.settings.max_depth.unwrap_or(DEPTH_GUARD);
+        let CameraRay {
+            mut ray,
+            mut differential,
+        } = camera;
         let mut beta = Rgb::ONE;
         let mut walk = Walk::Camera;
         // Density and origin of the last BSDF sample; none for a delta lobe or the camera.
@@ -105,7 +109,10 @@ impl Integrator for Path<'_> {
                     out.add(walk.component(), beta * le * weight);
                 }
             }
-            let bsdf = cx.scene.bsdf(&sp, None, TransportMode::Radiance);
+            let trail = Trail::land(differential, cx.scene, &ray, &sp);
+            let bsdf = cx
+                .scene
+                .bsdf(&sp, trail.footprint(), TransportMode::Radiance);
             if depth == 0 {
                 out.albedo += bsdf.albedo();
             }
@@ -148,6 +155,7 @@ impl Integrator for Path<'_> {
                 break;
             }
             ray = sp.spawn(s.wi);
+            differential = trail.leave(&sp, &s);
             scratch.rays.bounce += 1;
         }
     }

@@ -13,15 +13,16 @@
 
 use std::f64::consts::FRAC_1_PI;
 
+use super::footprint::Trail;
 use super::light_sampling::{power_heuristic, sample_direct};
 use super::stored_light::{Stored, sites};
-use super::{Integrator, IntegratorEntry, RenderContext, Scratch};
+use super::{CameraRay, Integrator, IntegratorEntry, RenderContext, Scratch};
 use arrayvec::ArrayVec;
 
 use crate::color::Rgb;
 use crate::effects::EffectSet;
 use crate::film::{Component, PixelSample};
-use crate::geometry::{Ray, SurfacePoint};
+use crate::geometry::{Differential, Ray, SurfacePoint};
 use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::math::DVec3;
 use crate::photons::PhotonClass;
@@ -58,6 +59,7 @@ const MAX_CHAINS: usize = 3 * SPLIT_DEPTH as usize + 1;
 /// A final-gather path at its next diffuse surface.
 struct Gathered {
     sp: SurfacePoint,
+    trail: Trail,
     bsdf: Bsdf,
     beta: Rgb,
 }
@@ -66,6 +68,7 @@ struct Gathered {
 #[derive(Clone, Copy)]
 struct Chain {
     ray: Ray,
+    differential: Option<Differential>,
     beta: Rgb,
     /// Scattering events so far.
     depth: u32,
@@ -76,7 +79,7 @@ struct Chain {
 impl Integrator for PhotonMapping<'_> {
     fn sample(
         &self,
-        ray: Ray,
+        camera: CameraRay,
         sampler: &mut Sampler,
         out: &mut PixelSample,
         scratch: &mut Scratch,
@@ -84,7 +87,8 @@ impl Integrator for PhotonMapping<'_> {
         scratch.rays.camera += 1;
         let mut pending = ArrayVec::<Chain, MAX_CHAINS>::new();
         pending.push(Chain {
-            ray,
+            ray: camera.ray,
+            differential: camera.differential,
             beta: Rgb::ONE,
             depth: 0,
             last: None,
@@ -118,6 +122,7 @@ impl PhotonMapping<'_> {
         let guard = cx.settings.max_depth.unwrap_or(CHAIN_GUARD);
         let Chain {
             mut ray,
+            mut differential,
             mut beta,
             depth: start,
             mut last,
@@ -130,7 +135,10 @@ impl PhotonMapping<'_> {
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
-            let bsdf = cx.scene.bsdf(&sp, None, TransportMode::Radiance);
+            let trail = Trail::land(differential, cx.scene, &ray, &sp);
+            let bsdf = cx
+                .scene
+                .bsdf(&sp, trail.footprint(), TransportMode::Radiance);
             if depth == 0 {
                 out.alpha += 1.0;
                 out.albedo += bsdf.albedo();
@@ -165,7 +173,7 @@ impl PhotonMapping<'_> {
                 let first = !std::mem::replace(diffuse_seen, true);
                 let share = beta.max_channel().min(1.0);
                 let densities = first.then_some(&mut out.photons);
-                let part = self.diffuse(&sp, &bsdf, share, sampler, densities, scratch);
+                let part = self.diffuse(&sp, &trail, &bsdf, share, sampler, densities, scratch);
                 for (component, radiance) in [
                     (Component::Direct, part.direct),
                     (Component::Caustics, part.caustics),
@@ -192,6 +200,7 @@ impl PhotonMapping<'_> {
                     for b in branches {
                         let side = Chain {
                             ray: sp.spawn(b.wi),
+                            differential: trail.leave(&sp, &b),
                             beta: beta * b.weight,
                             depth: depth + 1,
                             last: None,
@@ -204,6 +213,7 @@ impl PhotonMapping<'_> {
                     beta *= main.weight;
                     last = None;
                     ray = sp.spawn(main.wi);
+                    differential = trail.leave(&sp, &main);
                     scratch.rays.bounce += 1;
                     continue;
                 }
@@ -234,6 +244,7 @@ impl PhotonMapping<'_> {
                 return;
             }
             ray = sp.spawn(s.wi);
+            differential = trail.leave(&sp, &s);
             scratch.rays.bounce += 1;
         }
     }
@@ -251,9 +262,14 @@ impl PhotonMapping<'_> {
     /// Everything that the diffuse lobes at a point send back. `share` is how much of it the
     /// pixel sees: a faint branch gets fewer rays. `densities` takes the densities of global and
     /// caustic photons, if they are wanted.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "what a surface point is, and what it may use"
+    )]
     fn diffuse(
         &self,
         sp: &SurfacePoint,
+        trail: &Trail,
         full: &Bsdf,
         share: f64,
         sampler: &mut Sampler,
@@ -330,11 +346,14 @@ impl PhotonMapping<'_> {
             let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
                 continue;
             };
-            let ray = sp.spawn(s.wi);
+            let start = CameraRay {
+                ray: sp.spawn(s.wi),
+                differential: trail.leave(sp, &s),
+            };
             scratch.rays.gather += 1;
             let shadow = f64::from(n_shadow);
             let mut seen = Rgb::ZERO;
-            let next = self.next_diffuse(ray, s.weight, sampler, scratch, |on, beta| {
+            let next = self.next_diffuse(start, s.weight, sampler, scratch, |on, beta| {
                 let pdf_light = cx.scene.pdf_light(sp.p, on);
                 let weight = power_heuristic(n_gather, s.pdf, shadow, pdf_light);
                 seen = beta * cx.scene.emitted(on) * weight;
@@ -351,13 +370,17 @@ impl PhotonMapping<'_> {
     /// the ray meets a light before any surface.
     fn next_diffuse(
         &self,
-        mut ray: Ray,
+        start: CameraRay,
         mut beta: Rgb,
         sampler: &mut Sampler,
         scratch: &mut Scratch,
         mut on_light: impl FnMut(&SurfacePoint, Rgb),
     ) -> Option<Gathered> {
         let cx = &self.cx;
+        let CameraRay {
+            mut ray,
+            mut differential,
+        } = start;
         for depth in 0..CHAIN_GUARD {
             let hit = cx.accel.intersect(&ray)?;
             let sp = cx.scene.surface_point(&ray, &hit);
@@ -367,10 +390,18 @@ impl PhotonMapping<'_> {
             if depth == 0 && sp.light.is_some() {
                 on_light(&sp, beta);
             }
-            let bsdf = cx.scene.bsdf(&sp, None, TransportMode::Radiance);
+            let trail = Trail::land(differential, cx.scene, &ray, &sp);
+            let bsdf = cx
+                .scene
+                .bsdf(&sp, trail.footprint(), TransportMode::Radiance);
             let diffuse = bsdf.has_diffuse();
             if diffuse && !bsdf.has_specular() {
-                return Some(Gathered { sp, bsdf, beta });
+                return Some(Gathered {
+                    sp,
+                    trail,
+                    bsdf,
+                    beta,
+                });
             }
             // A surface of both kinds: one of them is followed, by its share.
             let specular = if diffuse {
@@ -379,6 +410,7 @@ impl PhotonMapping<'_> {
                     let bsdf = bsdf.diffuse_only();
                     return Some(Gathered {
                         sp,
+                        trail,
                         bsdf,
                         beta: beta / p,
                     });
@@ -401,6 +433,7 @@ impl PhotonMapping<'_> {
                 return None;
             }
             ray = sp.spawn(s.wi);
+            differential = trail.leave(&sp, &s);
             scratch.rays.gather += 1;
         }
         None
@@ -438,9 +471,12 @@ impl PhotonMapping<'_> {
         }
         let u = sampler.next_2d();
         if let Some(s) = at.bsdf.sample(sampler.next_1d(), u) {
-            let ray = at.sp.spawn(s.wi);
+            let start = CameraRay {
+                ray: at.sp.spawn(s.wi),
+                differential: at.trail.leave(&at.sp, &s),
+            };
             scratch.rays.gather += 1;
-            if let Some(next) = self.next_diffuse(ray, s.weight, sampler, scratch, |_, _| ()) {
+            if let Some(next) = self.next_diffuse(start, s.weight, sampler, scratch, |_, _| ()) {
                 sum += self.reflected(next, sampler, scratch, steps + 1);
             }
         }

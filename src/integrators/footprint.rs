@@ -1,0 +1,90 @@
+//! Differentials along a path, if anybody wants them.
+
+use super::CameraRay;
+use crate::cameras::Camera;
+use crate::geometry::{Differential, Footprint, Landing, Ray, SurfacePoint};
+use crate::materials::BsdfSample;
+use crate::math::DVec3;
+use crate::scene::Scene;
+
+/// Least distance between samples that is told apart, in pixels: what is finer is beyond what
+/// a filter of textures resolves.
+const FINEST: f64 = 0.125;
+
+/// The part of an image that a sample stands for.
+#[derive(Clone, Copy, Debug)]
+pub struct Spacing {
+    /// Size of the image in pixels.
+    pub image: [f64; 2],
+    /// Distance between samples in pixels.
+    pub pixels: f64,
+}
+
+impl Spacing {
+    /// Of `spp` samples per pixel.
+    pub fn new(width: u32, height: u32, spp: u32) -> Self {
+        Self {
+            image: [f64::from(width), f64::from(height)],
+            pixels: (1.0 / f64::from(spp).sqrt()).max(FINEST),
+        }
+    }
+
+    /// The camera's ray through the image point `(x, y)` in pixels, with its differential. It is
+    /// the difference of the rays half a pixel to either side, so that any camera will do; a
+    /// camera maps pixels so smoothly that nothing is lost.
+    pub fn camera_ray(&self, camera: &dyn Camera, x: f64, y: f64, differential: bool) -> CameraRay {
+        let [w, h] = self.image;
+        let at = |x: f64, y: f64| camera.ray(x / w, y / h);
+        let (o, d) = at(x, y);
+        let difference = |dx: f64, dy: f64| {
+            let (a, b) = (at(x - dx, y - dy), at(x + dx, y + dy));
+            let scale = |v: DVec3| v * self.pixels;
+            (scale(b.0 - a.0), scale(b.1 - a.1))
+        };
+        CameraRay {
+            ray: Ray::new(o, d),
+            differential: differential.then(|| {
+                let (x, y) = (difference(0.5, 0.0), difference(0.0, 0.5));
+                Differential {
+                    origin: [x.0, y.0],
+                    direction: [x.1, y.1],
+                }
+            }),
+        }
+    }
+}
+
+/// Where a ray landed, with or without derivatives.
+#[derive(Clone, Copy)]
+pub(super) struct Trail(Option<Landing>);
+
+impl Trail {
+    /// Carries the differential of `ray` to `sp`, if there is one.
+    #[inline]
+    pub(super) fn land(
+        differential: Option<Differential>,
+        scene: &Scene,
+        ray: &Ray,
+        sp: &SurfacePoint,
+    ) -> Self {
+        Self(differential.and_then(|d| d.land(&scene.geometry, ray, sp)))
+    }
+
+    /// What textures average over.
+    #[inline]
+    pub(super) fn footprint(&self) -> Option<Footprint> {
+        self.0.map(|l| l.footprint())
+    }
+
+    /// The differential of the ray that leaves by a sample of the scattering function.
+    #[inline]
+    pub(super) fn leave(&self, sp: &SurfacePoint, s: &BsdfSample) -> Option<Differential> {
+        self.0.map(|landing| {
+            if s.pdf > 0.0 {
+                landing.spread(sp, s.wi, s.pdf)
+            } else {
+                landing.follow(sp, s.wi)
+            }
+        })
+    }
+}
