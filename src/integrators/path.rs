@@ -100,8 +100,9 @@ impl Integrator for Path<'_> {
                 out.position += sp.p + cx.scene.center;
                 out.depth += sp.distance;
             }
+            let trail = Trail::land(differential, cx.scene, &ray, &sp);
             if sp.light.is_some() {
-                let le = cx.scene.emitted(&sp);
+                let le = cx.scene.emitted(&sp, trail.footprint());
                 if !le.is_black() {
                     let weight = last.map_or(1.0, |(pdf, from)| {
                         power_heuristic(1.0, pdf, 1.0, cx.scene.pdf_light(from, &sp))
@@ -109,7 +110,6 @@ impl Integrator for Path<'_> {
                     out.add(walk.component(), beta * le * weight);
                 }
             }
-            let trail = Trail::land(differential, cx.scene, &ray, &sp);
             let bsdf = cx
                 .scene
                 .bsdf(&sp, trail.footprint(), TransportMode::Radiance);

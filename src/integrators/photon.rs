@@ -22,7 +22,7 @@ use arrayvec::ArrayVec;
 use crate::color::Rgb;
 use crate::effects::EffectSet;
 use crate::film::{Component, PixelSample};
-use crate::geometry::{Differential, Ray, SurfacePoint};
+use crate::geometry::{Differential, Footprint, Ray, SurfacePoint};
 use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::math::DVec3;
 use crate::photons::PhotonClass;
@@ -155,7 +155,10 @@ impl PhotonMapping<'_> {
                 } else {
                     Component::Specular
                 };
-                out.add(component, beta * cx.scene.emitted(&sp) * weight);
+                out.add(
+                    component,
+                    beta * cx.scene.emitted(&sp, trail.footprint()) * weight,
+                );
             }
             if let Some(color) = bsdf.shown() {
                 let component = if depth == 0 {
@@ -353,11 +356,12 @@ impl PhotonMapping<'_> {
             scratch.rays.gather += 1;
             let shadow = f64::from(n_shadow);
             let mut seen = Rgb::ZERO;
-            let next = self.next_diffuse(start, s.weight, sampler, scratch, |on, beta| {
-                let pdf_light = cx.scene.pdf_light(sp.p, on);
-                let weight = power_heuristic(n_gather, s.pdf, shadow, pdf_light);
-                seen = beta * cx.scene.emitted(on) * weight;
-            });
+            let next =
+                self.next_diffuse(start, s.weight, sampler, scratch, |on, footprint, beta| {
+                    let pdf_light = cx.scene.pdf_light(sp.p, on);
+                    let weight = power_heuristic(n_gather, s.pdf, shadow, pdf_light);
+                    seen = beta * cx.scene.emitted(on, footprint) * weight;
+                });
             light.direct += seen * share;
             if let Some(next) = next {
                 light.indirect += self.reflected(next, sampler, scratch, 0) * share;
@@ -374,7 +378,7 @@ impl PhotonMapping<'_> {
         mut beta: Rgb,
         sampler: &mut Sampler,
         scratch: &mut Scratch,
-        mut on_light: impl FnMut(&SurfacePoint, Rgb),
+        mut on_light: impl FnMut(&SurfacePoint, Option<Footprint>, Rgb),
     ) -> Option<Gathered> {
         let cx = &self.cx;
         let CameraRay {
@@ -387,10 +391,10 @@ impl PhotonMapping<'_> {
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
-            if depth == 0 && sp.light.is_some() {
-                on_light(&sp, beta);
-            }
             let trail = Trail::land(differential, cx.scene, &ray, &sp);
+            if depth == 0 && sp.light.is_some() {
+                on_light(&sp, trail.footprint(), beta);
+            }
             let bsdf = cx
                 .scene
                 .bsdf(&sp, trail.footprint(), TransportMode::Radiance);
@@ -476,7 +480,7 @@ impl PhotonMapping<'_> {
                 differential: at.trail.leave(&at.sp, &s),
             };
             scratch.rays.gather += 1;
-            if let Some(next) = self.next_diffuse(start, s.weight, sampler, scratch, |_, _| ()) {
+            if let Some(next) = self.next_diffuse(start, s.weight, sampler, scratch, |_, _, _| ()) {
                 sum += self.reflected(next, sampler, scratch, steps + 1);
             }
         }

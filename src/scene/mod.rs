@@ -95,9 +95,9 @@ impl Scene {
 
     /// Radiance emitted at a surface point toward where the ray came from.
     #[inline]
-    pub fn emitted(&self, sp: &SurfacePoint) -> Rgb {
+    pub fn emitted(&self, sp: &SurfacePoint, footprint: Option<Footprint>) -> Rgb {
         sp.light.map_or(Rgb::ZERO, |id| {
-            self.light(id).radiance(&self.surface(sp, None))
+            self.light(id).radiance(&self.surface(sp, footprint))
         })
     }
 
