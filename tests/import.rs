@@ -112,80 +112,82 @@ fn broken_files_are_refused_with_their_place() {
 
     type Change = fn(&mut Value);
     let cases: &[(&str, u8, Change)] = &[
-        ("accessors[0]", 1, |v| v["accessors"][0]["count"] = json!(4)),
-        ("accessors[0]", 1, |v| {
+        ("/accessors/0", 1, |v| v["accessors"][0]["count"] = json!(4)),
+        ("/accessors/0", 1, |v| {
             v["accessors"][0]["count"] = json!(u64::MAX)
         }),
-        ("accessors[0]", 1, |v| {
+        ("/accessors/0", 1, |v| {
             v["accessors"][0]["byteOffset"] = json!(1_000_000)
         }),
-        ("accessors[0].componentType", 1, |v| {
+        ("/accessors/0/componentType", 1, |v| {
             v["accessors"][0]["componentType"] = json!(1)
         }),
-        ("accessors[0].type", 1, |v| {
+        ("/accessors/0/type", 1, |v| {
             v["accessors"][0]["type"] = json!("VEC2")
         }),
-        ("accessors[1]", 1, |v| {
+        ("/accessors/1", 1, |v| {
             v["accessors"][1]["count"] = json!(-1)
         }),
-        ("bufferViews[0]", 1, |v| {
+        ("/bufferViews/0", 1, |v| {
             v["bufferViews"][0]["byteLength"] = json!(99)
         }),
-        ("bufferViews[9]", 1, |v| {
+        ("/bufferViews/9", 1, |v| {
             v["accessors"][0]["bufferView"] = json!(9)
         }),
-        ("bufferViews[0].buffer", 1, |v| {
+        ("/bufferViews/0/buffer", 1, |v| {
             v["bufferViews"][0]["buffer"] = json!(7)
         }),
-        ("buffers[0]", 1, |v| {
+        ("/buffers/0", 1, |v| {
             v["buffers"][0]["byteLength"] = json!(400)
         }),
-        ("buffers[0].uri", 1, |v| {
+        ("/buffers/0/uri", 1, |v| {
             v["buffers"][0]["uri"] = json!("missing.bin")
         }),
-        ("buffers[0].uri", 1, |v| {
+        ("/buffers/0/uri", 1, |v| {
             v["buffers"][0]["uri"] = json!("data:;base64,***")
         }),
-        ("buffers[0]", 1, |v| {
+        ("/buffers/0", 1, |v| {
             v["buffers"][0] = json!({"byteLength": 39})
         }),
-        ("meshes[3]", 1, |v| v["nodes"][0]["mesh"] = json!(3)),
-        ("meshes[0].primitives[0]", 1, |v| {
+        ("/meshes/3", 1, |v| v["nodes"][0]["mesh"] = json!(3)),
+        ("/meshes/0/primitives/0", 1, |v| {
             v["buffers"][0]["uri"] = json!(
                 "data:;base64,\
                 AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAEJ"
             );
         }),
-        ("meshes[0].primitives[0].material", 1, |v| {
+        ("/meshes/0/primitives/0/material", 1, |v| {
             v["meshes"][0]["primitives"][0]["material"] = json!(2);
         }),
-        ("nodes[0].children[0]", 1, |v| {
+        ("/nodes/0/children/0", 1, |v| {
             v["nodes"][0]["children"] = json!([0])
         }),
-        ("nodes[5]", 1, |v| v["scenes"][0]["nodes"] = json!([5])),
-        ("nodes[0].translation", 1, |v| {
+        ("/nodes/5", 1, |v| v["scenes"][0]["nodes"] = json!([5])),
+        ("/nodes/0/translation", 1, |v| {
             v["nodes"][0]["translation"] = json!([1.0])
         }),
-        ("nodes[0].extras.sphere_radius", 1, |v| {
+        ("/nodes/0/extras/sphere_radius", 1, |v| {
             v["nodes"][0]["extras"] = json!({"sphere_radius": -1.0});
         }),
-        ("scene", 1, |v| v["scene"] = json!(4)),
+        ("/scene", 1, |v| v["scene"] = json!(4)),
         ("the scene", 1, |v| v["scenes"][0]["nodes"] = json!([])),
-        ("the scene", 1, |v| {
+        ("/meshes/0/primitives/0/attributes/POSITION", 1, |v| {
             v["buffers"][0]["uri"] = json!(
                 "data:;base64,\
                 AAAAAAAAAAAAAAAAAADAfwAAAAAAAAAAAAAAAAAAgD8AAAAAAAEC"
             );
         }),
-        ("asset.version", 3, |v| v["asset"]["version"] = json!("1.0")),
+        ("/asset/version", 3, |v| {
+            v["asset"]["version"] = json!("1.0")
+        }),
         ("the document", 1, |v| *v = json!({})),
-        ("extensionsRequired[0]", 3, |v| {
+        ("/extensionsRequired/0", 3, |v| {
             v["extensionsRequired"] = json!(["EXT_something"])
         }),
-        ("materials[0]", 2, |v| {
+        ("/materials/0", 2, |v| {
             v["materials"] = json!([{"extras": {"dualight_material": "no such kind"}}]);
         }),
-        ("cameras[0].type", 1, |v| {
+        ("/cameras/0/type", 1, |v| {
             v["cameras"] = json!([{"type": "fisheye"}]);
             v["nodes"][0]["camera"] = json!(0);
         }),

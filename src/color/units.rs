@@ -9,11 +9,8 @@
 /// In which units a file gives the intensities of its punctual lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightUnits {
-    /// By who wrote the file: as Blender exports them if it was Blender's exporter, otherwise
-    /// photometric.
+    /// As Blender exports them: candela and lux at 683 lm/W.
     #[default]
-    Auto,
-    /// As Blender exports them: candela and lux at 683 lm/W, spots with Cycles' falloff.
     Blender,
     /// Candela and lux, as the specification says; taken at 683 lm/W too.
     Photometric,
@@ -27,7 +24,7 @@ pub const LUMENS_PER_WATT: f64 = 683.0;
 /// What an intensity or irradiance of the file is multiplied by.
 pub fn radiometric_factor(units: LightUnits) -> f64 {
     match units {
-        LightUnits::Auto | LightUnits::Blender | LightUnits::Photometric => 1.0 / LUMENS_PER_WATT,
+        LightUnits::Blender | LightUnits::Photometric => 1.0 / LUMENS_PER_WATT,
         LightUnits::Radiometric => 1.0,
     }
 }

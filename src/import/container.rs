@@ -1,6 +1,6 @@
 //! From bytes to JSON and buffers: `.gltf` with data URIs or files beside it, and `.glb`.
 
-use std::borrow::Cow;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
@@ -8,45 +8,117 @@ use base64::engine::general_purpose::{STANDARD, STANDARD_NO_PAD, URL_SAFE};
 use serde_json::Value;
 
 use super::Problem;
+use super::buffer::Buffer;
 use super::json::Cursor;
 
 /// A parsed file.
 pub(super) struct Document {
     pub(super) json: Value,
-    pub(super) buffers: Vec<Vec<u8>>,
+    pub(super) buffers: Vec<Buffer>,
+    /// Bytes of the file and of all buffers.
+    pub(super) size: usize,
 }
 
-/// Reads the file and all buffers it names; `check` sees the JSON before any buffer is read.
+/// Opens the file and all buffers it names; `check` sees the JSON before any buffer is opened.
 pub(super) fn open(
     path: &Path,
     check: impl FnOnce(&Cursor<'_>) -> Result<(), Problem>,
 ) -> Result<Document, Problem> {
-    let bytes = std::fs::read(path).map_err(|e| Problem::file(path, &e))?;
-    let (json, chunk) = split(&bytes)?;
-    let json: Value = serde_json::from_slice(&json).map_err(|e| {
+    let unreadable = |e: io::Error| Problem::file(path, &e);
+    let file = Buffer::open(path).map_err(unreadable)?;
+    let mut size = file.len();
+    let parts = split(&file, path)?;
+    let text = file.read(parts.json.0, parts.json.1).map_err(unreadable)?;
+    let json: Value = serde_json::from_slice(&text).map_err(|e| {
         let place = format!("line {} column {}", e.line(), e.column());
         Problem::invalid(&place, format!("is not JSON ({e})"))
     })?;
+    drop(text);
     let root = Cursor::root(&json);
     check_version(&root)?;
     check(&root)?;
-    let mut chunk = chunk.map(Cow::into_owned);
+    let mut chunk = parts.binary.map(|(at, len)| file.part(at, len));
     let mut buffers = Vec::new();
     for (i, buffer) in root.items("buffers")?.into_iter().enumerate() {
-        buffers.push(read_buffer(&buffer, i, &mut chunk, path)?);
+        let data = read_buffer(&buffer, i, &mut chunk, path)?;
+        if buffer.get("uri").is_some() {
+            size += data.len();
+        }
+        buffers.push(data);
     }
-    Ok(Document { json, buffers })
+    Ok(Document {
+        json,
+        buffers,
+        size,
+    })
 }
 
-type Parts<'a> = (Cow<'a, [u8]>, Option<Cow<'a, [u8]>>);
+/// Where the parts of a file are: begin and length.
+struct Parts {
+    json: (usize, usize),
+    binary: Option<(usize, usize)>,
+}
 
-fn split(bytes: &[u8]) -> Result<Parts<'_>, Problem> {
-    if !bytes.starts_with(b"glTF") {
-        return Ok((Cow::Borrowed(bytes), None));
+/// Finds the chunks of a GLB file (glTF 2.0, 4.4); anything else is JSON as a whole.
+fn split(file: &Buffer, path: &Path) -> Result<Parts, Problem> {
+    let broken = |problem: String| Problem::invalid("GLB container", problem);
+    let read = |at: usize, len: usize| file.read(at, len).map_err(|e| Problem::file(path, &e));
+    let word = |bytes: &[u8], at: usize| {
+        let mut w = [0; 4];
+        w.copy_from_slice(&bytes[at..at + 4]);
+        u32::from_le_bytes(w)
+    };
+    let len = file.len();
+    if len < 4 || *read(0, 4)? != *b"glTF" {
+        return Ok(Parts {
+            json: (0, len),
+            binary: None,
+        });
     }
-    let glb = gltf::binary::Glb::from_slice(bytes)
-        .map_err(|e| Problem::invalid("GLB container", format!("is broken ({e})")))?;
-    Ok((glb.json, glb.bin))
+    if len < 12 {
+        return Err(broken(format!("is truncated: it has {len} bytes")));
+    }
+    let head = read(0, 12)?;
+    match word(&head, 4) {
+        2 => {}
+        other => {
+            return Err(Problem::unsupported(
+                "GLB container",
+                format!("binary glTF {other} is not glTF 2"),
+                "convert the file to glTF 2.0",
+            ));
+        }
+    }
+    let claimed = word(&head, 8) as usize;
+    if claimed > len {
+        return Err(broken(format!(
+            "is truncated: {len} bytes of {claimed} are there"
+        )));
+    }
+    let (mut at, mut json, mut binary) = (12, None, None);
+    while at + 8 <= claimed {
+        let chunk = read(at, 8)?;
+        let (n, kind) = (word(&chunk, 0) as usize, &chunk[4..8]);
+        let begin = at + 8;
+        if n > claimed - begin {
+            return Err(broken(format!(
+                "the chunk at byte {at} claims {n} bytes of {}",
+                claimed - begin
+            )));
+        }
+        match (kind, &json) {
+            (b"JSON", None) => json = Some((begin, n)),
+            (_, None) => return Err(broken("its first chunk is not JSON".into())),
+            (b"BIN\0", Some(_)) if binary.is_none() => binary = Some((begin, n)),
+            // Chunks of other kinds are for others (glTF 2.0, 4.4.3.1).
+            _ => {}
+        }
+        at = begin + n.next_multiple_of(4);
+    }
+    match json {
+        Some(json) => Ok(Parts { json, binary }),
+        None => Err(broken("has no JSON chunk".into())),
+    }
 }
 
 fn check_version(root: &Cursor<'_>) -> Result<(), Problem> {
@@ -69,16 +141,18 @@ fn check_version(root: &Cursor<'_>) -> Result<(), Problem> {
 fn read_buffer(
     buffer: &Cursor<'_>,
     index: usize,
-    chunk: &mut Option<Vec<u8>>,
+    chunk: &mut Option<Buffer>,
     file: &Path,
-) -> Result<Vec<u8>, Problem> {
+) -> Result<Buffer, Problem> {
     let length = buffer.need("byteLength")?.index()?;
     let data = match buffer.get("uri") {
-        None if index == 0 => chunk
-            .take()
-            .ok_or_else(|| buffer.problem("has neither a URI nor a binary chunk"))?,
-        None => return Err(buffer.problem("has no URI")),
-        Some(uri) => read_uri(&uri, file)?,
+        None => match chunk.take().filter(|_| index == 0) {
+            Some(chunk) => chunk,
+            // What was compressed may come without the uncompressed bytes.
+            None if is_fallback(buffer) => return Ok(Buffer::Absent { len: length }),
+            None => return Err(buffer.problem("has neither a URI nor a binary chunk")),
+        },
+        Some(uri) => open_uri(&uri, index, file)?,
     };
     if data.len() < length {
         return Err(buffer.problem(format!(
@@ -87,6 +161,29 @@ fn read_buffer(
         )));
     }
     Ok(data)
+}
+
+/// Whether a buffer is a placeholder for what `EXT_meshopt_compression` unpacks.
+fn is_fallback(buffer: &Cursor<'_>) -> bool {
+    buffer
+        .extension("EXT_meshopt_compression")
+        .is_some_and(|e| e.flag("fallback"))
+}
+
+/// Most buffers whose files stay open.
+const MAX_OPEN: usize = 64;
+
+/// What the URI of buffer `index` holds or names, in a file beside `file`.
+fn open_uri(uri: &Cursor<'_>, index: usize, file: &Path) -> Result<Buffer, Problem> {
+    if uri.str()?.starts_with("data:") || index >= MAX_OPEN {
+        return Ok(Buffer::Memory(read_uri(uri, file)?));
+    }
+    let path = beside(uri, file)?;
+    Buffer::open(&path).map_err(|e| unreadable(uri, &path, &e))
+}
+
+fn unreadable(uri: &Cursor<'_>, path: &Path, e: &io::Error) -> Problem {
+    uri.problem(format!("the file {} cannot be read ({e})", path.display()))
 }
 
 /// The bytes that a URI holds or names, in a file beside `file`.
@@ -105,6 +202,13 @@ pub(super) fn read_uri(uri: &Cursor<'_>, file: &Path) -> Result<Vec<u8>, Problem
             .or_else(|_| URL_SAFE.decode(body))
             .map_err(|e| uri.problem(format!("is not base64 ({e})")));
     }
+    let path = beside(uri, file)?;
+    std::fs::read(&path).map_err(|e| unreadable(uri, &path, &e))
+}
+
+/// The path that a URI names, relative to `file`.
+fn beside(uri: &Cursor<'_>, file: &Path) -> Result<PathBuf, Problem> {
+    let text = uri.str()?;
     if text.contains("://") {
         return Err(uri.problem(format!(
             "'{text}' is not beside the file; remote files are not read"
@@ -113,9 +217,7 @@ pub(super) fn read_uri(uri: &Cursor<'_>, file: &Path) -> Result<Vec<u8>, Problem
     let name = percent_decode(text)
         .and_then(|bytes| String::from_utf8(bytes).ok())
         .ok_or_else(|| uri.problem("is badly escaped"))?;
-    let path: PathBuf = file.parent().unwrap_or(Path::new("")).join(&name);
-    std::fs::read(&path)
-        .map_err(|e| uri.problem(format!("the file {} cannot be read ({e})", path.display())))
+    Ok(file.parent().unwrap_or(Path::new("")).join(&name))
 }
 
 fn percent_decode(text: &str) -> Option<Vec<u8>> {

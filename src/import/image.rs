@@ -39,7 +39,7 @@ enum State {
 /// The images of a file.
 pub(super) struct Images<'a> {
     root: Cursor<'a>,
-    buffers: &'a [Vec<u8>],
+    source: &'a Source<'a>,
     file: &'a Path,
     /// Images that were asked for, by index.
     wanted: HashMap<usize, State>,
@@ -49,10 +49,10 @@ pub(super) struct Images<'a> {
 
 impl<'a> Images<'a> {
     /// The images of `file`, none of them decoded.
-    pub(super) fn new(source: &Source<'a>, file: &'a Path) -> Self {
+    pub(super) fn new(source: &'a Source<'a>, file: &'a Path) -> Self {
         Self {
             root: source.root.clone(),
-            buffers: source.buffers,
+            source,
             file,
             wanted: HashMap::new(),
             decoded: false,
@@ -134,28 +134,7 @@ impl<'a> Images<'a> {
             return decode(&container::read_uri(&uri, self.file)?, &uri, budget);
         }
         let view = image.need("bufferView")?;
-        decode(self.view(&view)?, image, budget)
-    }
-
-    /// The bytes of the buffer view whose index stands at `at`.
-    fn view(&self, at: &Cursor<'a>) -> Result<&'a [u8], Problem> {
-        let view = self.root.element("bufferViews", at.index()?, at)?;
-        let buffer = view.need("buffer")?;
-        let bytes = self
-            .buffers
-            .get(buffer.index()?)
-            .ok_or_else(|| buffer.problem("names a buffer that does not exist"))?;
-        let start = view.index_or("byteOffset", 0)?;
-        let length = view.need("byteLength")?.index()?;
-        start
-            .checked_add(length)
-            .and_then(|end| bytes.get(start..end))
-            .ok_or_else(|| {
-                view.problem(format!(
-                    "covers {length} bytes from {start} of a buffer of {}",
-                    bytes.len()
-                ))
-            })
+        decode(&self.source.views.bytes(&view)?, image, budget)
     }
 }
 

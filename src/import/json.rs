@@ -1,4 +1,7 @@
-//! A cursor into the file's JSON that knows where it is, so that every error names the place.
+//! A cursor into the file's JSON that knows where it is, so that every error names the place, as
+//! a JSON pointer (RFC 6901).
+
+use std::borrow::Cow;
 
 use serde_json::Value;
 
@@ -42,10 +45,9 @@ impl<'a> Cursor<'a> {
     /// The member `key`; absent and `null` are the same.
     pub(super) fn get(&self, key: &str) -> Option<Self> {
         let value = self.value.get(key).filter(|v| !v.is_null())?;
-        let dot = if self.path.is_empty() { "" } else { "." };
         Some(Self {
             value,
-            path: format!("{}{dot}{key}", self.path),
+            path: format!("{}/{}", self.path, escape(key)),
         })
     }
 
@@ -79,7 +81,7 @@ impl<'a> Cursor<'a> {
             .enumerate()
             .map(|(i, value)| Self {
                 value,
-                path: format!("{}[{i}]", self.path),
+                path: format!("{}/{i}", self.path),
             })
             .collect())
     }
@@ -91,9 +93,9 @@ impl<'a> Cursor<'a> {
             .and_then(|list| list.get(index))
             .map(|value| Self {
                 value,
-                path: format!("{key}[{index}]"),
+                path: format!("/{key}/{index}"),
             })
-            .ok_or_else(|| from.problem(format!("{key}[{index}] does not exist")))
+            .ok_or_else(|| from.problem(format!("/{key}/{index} does not exist")))
     }
 
     /// This number.
@@ -165,5 +167,31 @@ impl<'a> Cursor<'a> {
             .and_then(|n| n.value.as_str())
             .filter(|n| !n.is_empty())
             .map_or_else(|| self.path.clone(), str::to_owned)
+    }
+}
+
+/// A key as a part of a JSON pointer.
+fn escape(key: &str) -> Cow<'_, str> {
+    if key.contains(['~', '/']) {
+        Cow::Owned(key.replace('~', "~0").replace('/', "~1"))
+    } else {
+        Cow::Borrowed(key)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn paths_are_json_pointers() {
+        let v = json!({"a/b": [{"c~d": 1}]});
+        let at = Cursor::root(&v).get("a/b").unwrap().elements().unwrap();
+        let at = at[0].get("c~d").unwrap();
+        assert_eq!(at.path(), "/a~1b/0/c~0d");
+        assert_eq!(v.pointer(at.path()), Some(at.value()));
     }
 }

@@ -2,22 +2,42 @@
 
 use super::accessor::Source;
 use super::json::Cursor;
+use super::vertices::{Attributes, Vertices};
 use super::{Notes, Problem};
-use crate::geometry::TriangleMesh;
+use crate::geometry::{SphereSet, TriangleMesh};
+
+/// What a primitive is made of.
+pub(super) enum Part {
+    /// Triangles.
+    Mesh(TriangleMesh),
+    /// Points with a radius.
+    Spheres(SphereSet),
+}
 
 /// Reads a primitive; `None` if it makes no surface.
 pub(super) fn read<'a>(
     p: &Cursor<'a>,
     source: &Source<'a>,
     notes: &mut Notes,
-) -> Result<Option<TriangleMesh>, Problem> {
+) -> Result<Option<Part>, Problem> {
     let mode = p.index_or("mode", 4)?;
-    if !(4..=6).contains(&mode) {
-        notes.add(
-            "primitives that are points or lines have no surface and are left out",
-            1,
-        );
+    let map = p.need("attributes")?;
+    let Some(position) = map.get("POSITION") else {
+        notes.add("primitives without positions are left out", 1);
         return Ok(None);
+    };
+    match mode {
+        0 if map.get("_RADIUS").is_some() => {}
+        4..=6 => {}
+        0 => {
+            notes.add("points without _RADIUS have no surface and are left out", 1);
+            return Ok(None);
+        }
+        1..=3 => {
+            notes.add("lines have no surface and are left out", 1);
+            return Ok(None);
+        }
+        other => return Err(p.need("mode")?.problem(format!("{other} is no mode"))),
     }
     if p.get("targets").is_some() {
         notes.add(
@@ -25,75 +45,107 @@ pub(super) fn read<'a>(
             1,
         );
     }
-    let attributes = p.need("attributes")?;
-    let Some(position) = attributes.get("POSITION") else {
-        notes.add("primitives without positions are left out", 1);
-        return Ok(None);
+    let mut attributes = Attributes {
+        count: source.accessor(&position)?.count,
+        source,
+        map,
+        pick: None,
     };
-    let positions = source.read::<3>(&position)?;
-    let n = positions.len();
-    let order = match p.get("indices") {
-        Some(indices) => source.read_indices(&indices)?,
-        None => {
-            (0..u32::try_from(n).map_err(|_| position.problem("has too many vertices"))?).collect()
+    let order = order(p, &mut attributes, &position)?;
+    let vertices = attributes.vertices()?;
+    Ok(Some(match mode {
+        0 => Part::Spheres(spheres(&vertices, order)),
+        _ => Part::Mesh(TriangleMesh {
+            indices: triangles(order, vertices.positions.len(), mode),
+            positions: vertices.positions,
+            normals: vertices.normals,
+            uv_sets: vertices.uv_sets,
+            colors: vertices.colors,
+            tangents: vertices.tangents,
+        }),
+    }))
+}
+
+/// The indices of a primitive, if it has any. Where they name fewer vertices than there are, as
+/// when many primitives share one array, only those are picked.
+fn order<'a>(
+    p: &Cursor<'a>,
+    attributes: &mut Attributes<'_, 'a>,
+    position: &Cursor<'a>,
+) -> Result<Option<Vec<u32>>, Problem> {
+    let n = attributes.count;
+    let Some(indices) = p.get("indices") else {
+        return match u32::try_from(n) {
+            Ok(_) => Ok(None),
+            Err(_) => Err(position.problem("has too many vertices")),
+        };
+    };
+    let mut order = attributes.source.indices(&indices)?;
+    if let Some(i) = order.iter().copied().max().filter(|&i| i as usize >= n) {
+        return Err(indices.problem(format!("index {i} is out of range: there are {n} vertices")));
+    }
+    if order.len() < n {
+        let mut used = order.clone();
+        used.sort_unstable();
+        used.dedup();
+        if used.len() < n {
+            for i in &mut order {
+                *i = used.binary_search(i).unwrap_or_default() as u32;
+            }
+            attributes.pick = Some(used);
         }
-    };
-    let mesh = TriangleMesh {
-        positions: narrow(positions),
-        indices: triangles(&order, mode),
-        normals: match attributes.get("NORMAL") {
-            Some(a) => narrow(same_length(&a, source.read::<3>(&a)?, n)?),
-            None => Vec::new(),
-        },
-        uv_sets: match attributes.get("TEXCOORD_0") {
-            Some(a) => vec![narrow(same_length(&a, source.read::<2>(&a)?, n)?)],
-            None => Vec::new(),
-        },
-        ..Default::default()
-    };
-    if let Some(i) = order.iter().find(|&&i| i as usize >= n) {
-        return Err(p.problem(format!("index {i} is out of range: there are {n} vertices")));
     }
-    Ok(Some(mesh))
+    Ok(Some(order))
 }
 
-fn same_length<const N: usize>(
-    a: &Cursor<'_>,
-    v: Vec<[f64; N]>,
-    n: usize,
-) -> Result<Vec<[f64; N]>, Problem> {
-    if v.len() == n {
-        Ok(v)
-    } else {
-        Err(a.problem(format!("has {} elements for {n} positions", v.len())))
-    }
-}
-
-fn narrow<const N: usize>(v: Vec<[f64; N]>) -> Vec<[f32; N]> {
-    v.into_iter().map(|e| e.map(|x| x as f32)).collect()
+/// The spheres of points, each once.
+fn spheres(v: &Vertices, order: Option<Vec<u32>>) -> SphereSet {
+    let one = |i: usize| {
+        let ([x, y, z], [r]) = (v.positions[i], v.radii[i]);
+        [x, y, z, r]
+    };
+    let spheres = match order {
+        Some(mut order) => {
+            order.sort_unstable();
+            order.dedup();
+            order.into_iter().map(|i| one(i as usize)).collect()
+        }
+        None => (0..v.positions.len()).map(one).collect(),
+    };
+    SphereSet { spheres }
 }
 
 /// Triangles of a list (mode 4), strip (5) or fan (6); strips alternate their winding
 /// (glTF 2.0, 3.7.2.1).
-fn triangles(order: &[u32], mode: usize) -> Vec<[u32; 3]> {
+fn triangles(order: Option<Vec<u32>>, n: usize, mode: usize) -> Vec<[u32; 3]> {
+    let Some(order) = order else {
+        return (0..triangle_count(n, mode))
+            .map(|t| corners(t, mode).map(|k| k as u32))
+            .collect();
+    };
+    if mode == 4 {
+        return order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+    }
+    (0..triangle_count(order.len(), mode))
+        .map(|t| corners(t, mode).map(|k| order[k]))
+        .collect()
+}
+
+/// Number of triangles that `n` vertices make.
+fn triangle_count(n: usize, mode: usize) -> usize {
     match mode {
-        5 => order
-            .windows(3)
-            .enumerate()
-            .map(|(i, w)| {
-                if i % 2 == 0 {
-                    [w[0], w[1], w[2]]
-                } else {
-                    [w[0], w[2], w[1]]
-                }
-            })
-            .collect(),
-        6 => order
-            .windows(2)
-            .skip(1)
-            .map(|w| [w[0], w[1], order[0]])
-            .collect(),
-        _ => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+        4 => n / 3,
+        _ => n.saturating_sub(2),
+    }
+}
+
+/// Which vertices make triangle `t`.
+fn corners(t: usize, mode: usize) -> [usize; 3] {
+    match mode {
+        5 if t.is_multiple_of(2) => [t, t + 1, t + 2],
+        5 => [t, t + 2, t + 1],
+        6 => [t + 1, t + 2, 0],
+        _ => [3 * t, 3 * t + 1, 3 * t + 2],
     }
 }
 
@@ -103,9 +155,12 @@ mod tests {
 
     #[test]
     fn strips_and_fans_keep_their_winding() {
-        assert_eq!(triangles(&[0, 1, 2, 3], 5), [[0, 1, 2], [1, 3, 2]]);
-        assert_eq!(triangles(&[0, 1, 2, 3], 6), [[1, 2, 0], [2, 3, 0]]);
-        assert_eq!(triangles(&[0, 1, 2, 3], 4), [[0, 1, 2]]);
-        assert!(triangles(&[], 6).is_empty() && triangles(&[0], 5).is_empty());
+        for order in [Some(vec![0, 1, 2, 3]), None] {
+            let triangles = |mode| triangles(order.clone(), 4, mode);
+            assert_eq!(triangles(5), [[0, 1, 2], [1, 3, 2]]);
+            assert_eq!(triangles(6), [[1, 2, 0], [2, 3, 0]]);
+            assert_eq!(triangles(4), [[0, 1, 2]]);
+        }
+        assert!(triangles(Some(vec![]), 9, 6).is_empty() && triangles(None, 1, 5).is_empty());
     }
 }

@@ -5,20 +5,20 @@
 //! not supported is named in a warning; what a file *requires* and is not supported is an error.
 
 mod accessor;
-mod camera;
+mod buffer;
 mod container;
-mod environment;
 mod image;
 mod json;
 #[cfg(feature = "ktx2")]
 mod ktx2;
-mod light;
 mod material;
 mod mesh;
 mod node;
 mod tangents;
 mod texture;
 mod used;
+mod vertices;
+mod views;
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -28,7 +28,6 @@ use crate::error::{Error, Result};
 use crate::materials::MaterialDesc;
 use crate::scene::{Scene, SceneBuilder, ScenePlugins};
 use accessor::Source;
-pub use environment::{EnvironmentOption, EnvironmentSource};
 use image::Images;
 use json::Cursor;
 use node::Walker;
@@ -40,8 +39,6 @@ pub struct ImportOptions {
     pub light_units: LightUnits,
     /// Name of the scene; `None` for the file's default.
     pub scene: Option<String>,
-    /// Light from all around, instead of the file's own.
-    pub environment: Option<EnvironmentOption>,
 }
 
 /// Extensions that are honoured; a file may require them.
@@ -161,10 +158,7 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
     let document = container::open(path, |root| check_extensions(root, &mut notes))
         .map_err(|p| p.into_error(path))?;
     let root = Cursor::root(&document.json);
-    let source = Source {
-        root: root.clone(),
-        buffers: &document.buffers,
-    };
+    let source = Source::new(root.clone(), &document.buffers, document.size);
     let mut images = Images::new(&source, path);
     fill(
         &root,
@@ -181,9 +175,6 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
             other => other,
         },
     })?;
-    if let Some(environment) = &options.environment {
-        builder.add_light(environment.light()?);
-    }
     for (what, n) in notes.0 {
         builder.warn(if n > 1 {
             format!("{what} ({n} times)")
@@ -257,18 +248,9 @@ fn fill<'a>(
             ..Default::default()
         })
         .map_err(|e| Failure::Plugin("the default material".into(), Box::new(e)))?;
-    let light_units = light::resolve(options.light_units, root);
-    if root.extension("KHR_lights_punctual").is_some() && options.light_units == LightUnits::Auto {
-        builder.inform(match light_units {
-            LightUnits::Blender => {
-                "lights are taken as Blender exports them: divided by 683, spots by Cycles' curve"
-            }
-            _ => "lights are taken as candela and lux, at 683 lm/W",
-        });
-    }
     let mut walker = Walker {
         source,
-        light_units,
+        options,
         materials: &materials,
         default_material,
         builder,
@@ -309,7 +291,7 @@ fn roots<'a>(root: &Cursor<'a>, options: &ImportOptions) -> Result<Vec<Cursor<'a
                 let known: Vec<String> = scenes.iter().map(Cursor::name).collect();
                 Problem {
                     remedy: format!("known scenes: {}", known.join(", ")),
-                    ..Problem::invalid("scenes", format!("none is named '{name}'"))
+                    ..Problem::invalid("/scenes", format!("none is named '{name}'"))
                 }
             })?)
         }
@@ -326,7 +308,7 @@ fn roots<'a>(root: &Cursor<'a>, options: &ImportOptions) -> Result<Vec<Cursor<'a
         Some(scene) => scene.items("nodes"),
         None => Err(Problem {
             remedy: "export the file with a scene".into(),
-            ..Problem::invalid("scenes", "the file holds no scene")
+            ..Problem::invalid("/scenes", "the file holds no scene")
         }),
     }
 }

@@ -3,7 +3,6 @@
 
 mod camera_pass;
 mod footprint;
-mod gather;
 mod light_sampling;
 mod path;
 mod photon;

@@ -10,6 +10,7 @@ use image::{ImageBuffer, ImageFormat, Luma, LumaA, Rgb, Rgba};
 use serde_json::{Value, json};
 
 use super::super::accessor::Source;
+use super::super::buffer::Buffer;
 use super::*;
 use crate::textures::Image;
 
@@ -46,10 +47,8 @@ fn load_beside(
     path: &std::path::Path,
 ) -> Result<Option<Texture>, Problem> {
     let root = Cursor::root(json);
-    let source = Source {
-        root: root.clone(),
-        buffers,
-    };
+    let buffers: Vec<Buffer> = buffers.iter().cloned().map(Buffer::Memory).collect();
+    let source = Source::new(root.clone(), &buffers, 0);
     let mut images = Images::new(&source, path);
     let info = root.need("info")?;
     read(&info, Content::Color, &mut images, &mut Notes::default())?;
@@ -117,10 +116,7 @@ fn an_image_is_decoded_once_however_often_it_is_named() {
         "a": {"index": 0}, "b": {"index": 1}, "unused": {"index": 2},
     });
     let root = Cursor::root(&json);
-    let source = Source {
-        root: root.clone(),
-        buffers: &[],
-    };
+    let source = Source::new(root.clone(), &[], 0);
     let mut images = Images::new(&source, std::path::Path::new("scene.gltf"));
     let info = |key: &str| root.need(key).unwrap();
     let (notes, color) = (&mut Notes::default(), Content::Color);

@@ -1,0 +1,110 @@
+//! Buffer views: ranges of buffers, with a bound on what all of them together may grow to.
+
+use std::borrow::Cow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::Problem;
+use super::buffer::Buffer;
+use super::json::Cursor;
+
+/// The buffer views of a file.
+pub(super) struct Views<'a> {
+    root: Cursor<'a>,
+    buffers: &'a [Buffer],
+    /// Bytes that may still be decoded.
+    budget: AtomicUsize,
+}
+
+/// A buffer view.
+pub(super) struct View<'a> {
+    /// Where it stands.
+    pub(super) at: Cursor<'a>,
+    /// Bytes from one element to the next; 0 if they follow each other.
+    pub(super) stride: usize,
+    /// Number of bytes.
+    pub(super) len: usize,
+    start: usize,
+    buffer: &'a Buffer,
+}
+
+/// What a file may grow to when it is decoded: a small file has room for a scene, a large one for
+/// the best that compression does. A few bytes that claim gigabytes are refused.
+const BUDGET: usize = 64 << 20;
+const GROWTH: usize = 256;
+
+impl<'a> Views<'a> {
+    /// The views of the document `root`, a file of `size` bytes.
+    pub(super) fn new(root: Cursor<'a>, buffers: &'a [Buffer], size: usize) -> Self {
+        Self {
+            root,
+            buffers,
+            budget: AtomicUsize::new(size.saturating_mul(GROWTH).saturating_add(BUDGET)),
+        }
+    }
+
+    /// Takes `bytes` off what may be decoded; `at` is what needs them.
+    pub(super) fn claim(&self, bytes: usize, at: &Cursor<'_>) -> Result<(), Problem> {
+        self.budget
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+                left.checked_sub(bytes)
+            })
+            .map(|_| ())
+            .map_err(|_| {
+                Problem::unsupported(
+                    at.path(),
+                    format!("{bytes} more bytes are out of proportion to the size of the file"),
+                    "make it smaller, or export it without compression",
+                )
+            })
+    }
+
+    /// The view whose index stands at `from`.
+    pub(super) fn get(&self, from: &Cursor<'a>) -> Result<View<'a>, Problem> {
+        let at = self.root.element("bufferViews", from.index()?, from)?;
+        let stride = at.index_or("byteStride", 0)?;
+        self.range(at, stride)
+    }
+
+    /// The bytes of the view whose index stands at `from`.
+    pub(super) fn bytes(&self, from: &Cursor<'a>) -> Result<Cow<'a, [u8]>, Problem> {
+        let view = self.get(from)?;
+        view.read(0, view.len)
+    }
+
+    /// The part of a buffer that `at` describes by `buffer`, `byteOffset` and `byteLength`.
+    fn range(&self, at: Cursor<'a>, stride: usize) -> Result<View<'a>, Problem> {
+        let index = at.need("buffer")?;
+        let buffer = self
+            .buffers
+            .get(index.index()?)
+            .ok_or_else(|| index.problem("names a buffer that does not exist"))?;
+        let start = at.index_or("byteOffset", 0)?;
+        let len = at.need("byteLength")?.index()?;
+        if start.checked_add(len).is_none_or(|end| end > buffer.len()) {
+            return Err(at.problem(format!(
+                "covers bytes {start} to {} of a buffer of {}",
+                start.saturating_add(len),
+                buffer.len()
+            )));
+        }
+        Ok(View {
+            at,
+            stride,
+            len,
+            start,
+            buffer,
+        })
+    }
+}
+
+impl<'a> View<'a> {
+    /// `len` bytes from `at` on.
+    pub(super) fn read(&self, at: usize, len: usize) -> Result<Cow<'a, [u8]>, Problem> {
+        if at.checked_add(len).is_none_or(|end| end > self.len) {
+            return Err(self.at.problem(format!("ends before byte {at} + {len}")));
+        }
+        self.buffer
+            .read(self.start + at, len)
+            .map_err(|e| self.at.problem(format!("cannot be read ({e})")))
+    }
+}
