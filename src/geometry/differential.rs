@@ -15,6 +15,9 @@ use super::{Footprint, Geometry, Ray, Shape, SurfacePoint, sphere, triangle};
 use crate::ad::{Real, V3};
 use crate::math::{DAffine3, DMat3, DVec3, Frame, Vec3};
 
+// The functions of this file are kept out of line: most scenes have no texture, and then the
+// loops of the integrators should not carry them.
+
 /// Share of a lobe's solid angle `1/pdf` that one sample of it stands for. It is a choice between
 /// noise and blur: at this one a glossy reflection of a texture comes out wider by 3 % (widths
 /// add in quadrature).
@@ -44,6 +47,7 @@ pub struct Landing {
 impl Differential {
     /// Carries the differential of `ray` to the point `sp` that it met. `None` where it has no
     /// derivative, as at the rim of a sphere.
+    #[inline(never)]
     pub fn land(&self, geometry: &Geometry, ray: &Ray, sp: &SurfacePoint) -> Option<Landing> {
         let object = geometry.object(sp.object);
         let o = pair(ray.origin(), self.origin);
@@ -77,6 +81,7 @@ impl Landing {
 
     /// The differential of the ray that leaves `sp` along the unit direction `wi`, a mirror-like
     /// reflection or refraction. Its index of refraction is read off the two directions.
+    #[inline(never)]
     pub fn follow(&self, sp: &SurfacePoint, wi: DVec3) -> Differential {
         let d = pair(-sp.wo, self.direction);
         let (cos_o, cos_i) = (sp.wo.dot(sp.n), wi.dot(sp.n));
@@ -108,6 +113,7 @@ impl Landing {
     /// The differential of a ray that leaves along `wi`, drawn from a lobe with density `pdf` in
     /// solid angle. It stands for a share of `1/pdf` around itself, or for what the surface as a
     /// mirror would make of it, whichever is larger.
+    #[inline(never)]
     pub fn spread(&self, sp: &SurfacePoint, wi: DVec3, pdf: f64) -> Differential {
         let solid_angle = (SHARE / pdf).min(SHARE * std::f64::consts::TAU);
         let radius = (solid_angle * std::f64::consts::FRAC_1_PI).sqrt();
