@@ -222,9 +222,11 @@ impl Texture {
             let half = inside.sqrt();
             let (from, to) = (x + center - half, x + center + half);
             let row = self.sampler.wrap_v.index(iy, h) as usize * w as usize;
+            let cross = 2.0 * b * dy;
+            let rest = c * dy * dy;
             for ix in from.ceil() as i64..=to.floor() as i64 {
                 let dx = ix as f64 - x;
-                let r2 = a * dx * dx + 2.0 * b * dx * dy + c * dy * dy;
+                let r2 = (a * dx + cross) * dx + rest;
                 let column = self.sampler.wrap_u.index(ix, w) as usize;
                 mean.add(texel(row + column), kernel(r2));
             }

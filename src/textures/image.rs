@@ -151,61 +151,28 @@ impl Image {
     /// The texel of index `i`.
     #[inline]
     pub(super) fn at(&self, i: usize, content: Content) -> [f64; 4] {
-        let srgb = content.is_srgb();
-        let i = i * self.channels;
         match &self.texels {
             Texels::U8(v) => {
-                let [color, alpha] = if srgb {
-                    [&SRGB_8, &LINEAR_8]
+                let linear = LazyLock::force(&LINEAR_8);
+                let color = if content.is_srgb() {
+                    LazyLock::force(&SRGB_8)
                 } else {
-                    [&LINEAR_8; 2]
+                    linear
                 };
-                let (color, alpha) = (LazyLock::force(color), LazyLock::force(alpha));
-                self.expand(
-                    i,
-                    |i| f64::from(color[usize::from(v[i])]),
-                    |i| f64::from(alpha[usize::from(v[i])]),
-                )
-            }
-            Texels::U16(v) if srgb => {
-                let table = LazyLock::force(&SRGB_16);
-                self.expand(
-                    i,
-                    |i| f64::from(table[usize::from(v[i])]),
-                    |i| f64::from(v[i]) / 65535.0,
-                )
+                let decode = |t: u8| color[usize::from(t)];
+                expand(v, i, self.channels, decode, |t| linear[usize::from(t)])
             }
             Texels::U16(v) => {
-                let f = |i: usize| f64::from(v[i]) / 65535.0;
-                self.expand(i, f, f)
+                let linear = |t| f64::from(t) * (1.0 / 65535.0);
+                if content.is_srgb() {
+                    let table = LazyLock::force(&SRGB_16);
+                    let color = |t| f64::from(table[usize::from(t)]);
+                    expand(v, i, self.channels, color, linear)
+                } else {
+                    expand(v, i, self.channels, linear, linear)
+                }
             }
-            Texels::F32(v) => {
-                let f = |i: usize| f64::from(v[i]);
-                self.expand(i, f, f)
-            }
-        }
-    }
-
-    /// The four numbers of the texel that begins at `i`: grey is all colours, and what has no
-    /// alpha is whole.
-    #[inline]
-    fn expand(
-        &self,
-        i: usize,
-        color: impl Fn(usize) -> f64,
-        alpha: impl Fn(usize) -> f64,
-    ) -> [f64; 4] {
-        match self.channels {
-            1 => {
-                let g = color(i);
-                [g, g, g, 1.0]
-            }
-            2 => {
-                let g = color(i);
-                [g, g, g, alpha(i + 1)]
-            }
-            3 => [color(i), color(i + 1), color(i + 2), 1.0],
-            _ => [color(i), color(i + 1), color(i + 2), alpha(i + 3)],
+            Texels::F32(v) => expand(v, i, self.channels, f64::from, f64::from),
         }
     }
 
@@ -259,15 +226,44 @@ impl Image {
     }
 }
 
-/// Linear values of the codes of 8 bits.
-static LINEAR_8: LazyLock<Vec<f32>> = LazyLock::new(|| table(255, |x| x));
-/// The same by the sRGB curve.
-static SRGB_8: LazyLock<Vec<f32>> = LazyLock::new(|| table(255, srgb_to_linear));
-/// Linear values of the codes of 16 bits by the sRGB curve.
-static SRGB_16: LazyLock<Vec<f32>> = LazyLock::new(|| table(65535, srgb_to_linear));
-
-fn table(largest: u32, curve: impl Fn(f64) -> f64) -> Vec<f32> {
-    (0..=largest)
-        .map(|i| curve(f64::from(i) / f64::from(largest)) as f32)
-        .collect()
+/// The four numbers of texel `i`: grey is all colours, and what has no alpha is whole.
+#[inline]
+fn expand<T: Copy>(
+    v: &[T],
+    i: usize,
+    channels: usize,
+    color: impl Fn(T) -> f64,
+    alpha: impl Fn(T) -> f64,
+) -> [f64; 4] {
+    match channels {
+        1 => {
+            let g = color(v[i]);
+            [g, g, g, 1.0]
+        }
+        2 => {
+            let [g, a] = v.as_chunks().0[i];
+            let g = color(g);
+            [g, g, g, alpha(a)]
+        }
+        3 => {
+            let [r, g, b] = v.as_chunks().0[i];
+            [color(r), color(g), color(b), 1.0]
+        }
+        _ => {
+            let [r, g, b, a] = v.as_chunks().0[i];
+            [color(r), color(g), color(b), alpha(a)]
+        }
+    }
 }
+
+/// Linear values of the codes of 8 bits.
+static LINEAR_8: LazyLock<[f64; 256]> = LazyLock::new(|| std::array::from_fn(|i| i as f64 / 255.0));
+/// The same by the sRGB curve.
+static SRGB_8: LazyLock<[f64; 256]> =
+    LazyLock::new(|| std::array::from_fn(|i| srgb_to_linear(i as f64 / 255.0)));
+/// Linear values of the codes of 16 bits by the sRGB curve.
+static SRGB_16: LazyLock<Vec<f32>> = LazyLock::new(|| {
+    (0..=65535)
+        .map(|i| srgb_to_linear(f64::from(i) / 65535.0) as f32)
+        .collect()
+});
