@@ -66,6 +66,8 @@ fn zoo() -> Vec<(String, Box<dyn Light>, Rgb)> {
             "sphere" => add("", base.clone(), PI * 4.0 * PI * 1.25),
             "point" => add("", base.clone(), 4.0 * PI),
             "directional" => add("", base.clone(), 9.0 * PI),
+            // Radiance 1 through the disc from every direction.
+            "environment" => add("", base.clone(), 4.0 * PI * 9.0 * PI),
             "spot" => {
                 for (inner, outer) in [(0.0f64, 0.5f64), (0.3, 0.5), (0.5, 0.5), (1.0, PI)] {
                     // The falloff is a squared ramp in the cosine: it weighs a third.
@@ -99,7 +101,12 @@ fn photons_carry_the_power_of_their_light() {
             let n = 20_000;
             let mut sum = Rgb::ZERO;
             for _ in 0..n {
-                let from = light.sample_origin(rng.next_2d()).expect("an origin");
+                let u = rng.next_2d();
+                if let Some(beam) = light.sample_distant(u) {
+                    sum += beam.irradiance * (9.0 * PI);
+                    continue;
+                }
+                let from = light.sample_origin(u).expect("an origin");
                 let (dir, pdf) = light.sample_direction(&from, rng.next_2d());
                 sum += light.emitted(&from, dir) / (pdf * from.pdf_area);
             }
@@ -117,7 +124,9 @@ fn surfaces_emit_to_their_front_alone_unless_they_are_double_sided() {
         let mut rng = Rng::new(5);
         let (mut front, mut back) = (0, 0);
         for _ in 0..10_000 {
-            let from = light.sample_origin(rng.next_2d()).expect("an origin");
+            let Some(from) = light.sample_origin(rng.next_2d()) else {
+                break;
+            };
             let Some(ng) = from.ng else { break };
             let (dir, _) = light.sample_direction(&from, rng.next_2d());
             if dir.dot(ng) > 0.0 {

@@ -49,6 +49,8 @@ pub enum Command {
 /// What the numbers of a file's lights mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Units {
+    /// As Blender's if Blender's exporter wrote the file, otherwise photometric
+    Auto,
     /// As Blender's exporter writes them: watts times 683 for lamps
     Blender,
     /// Candela and lux, as glTF says; divided by 683 lm/W
@@ -64,13 +66,22 @@ pub struct SceneArgs {
     #[arg(value_name = "SCENE")]
     pub file: PathBuf,
     /// What the numbers of the file's lights mean
+    #[arg(long, value_enum, default_value = "auto", hide_possible_values = false)]
+    pub light_units: Units,
+    /// Light from all around: an image of the sky (.hdr, .exr) or a colour R,G,B; replaces the file's
+    #[arg(long, value_name = "FILE|R,G,B")]
+    pub environment: Option<values::Sky>,
+    /// What the environment is multiplied by
+    #[arg(long, value_name = "X", default_value = "1", value_parser = values::factor)]
+    pub environment_strength: f64,
+    /// Turns the environment about the vertical axis, counter-clockwise seen from above
     #[arg(
         long,
-        value_enum,
-        default_value = "blender",
-        hide_possible_values = false
+        value_name = "DEGREES",
+        default_value = "0",
+        allow_negative_numbers = true
     )]
-    pub light_units: Units,
+    pub environment_rotation: f64,
     /// Scene within the file, if it holds several [default: the file's default]
     #[arg(long = "scene", value_name = "NAME")]
     pub name: Option<String>,
@@ -141,6 +152,10 @@ pub struct RenderArgs {
     /// Never end long paths by chance
     #[arg(long, help_heading = "Light transport")]
     pub no_roulette: bool,
+    /// Whether the camera sees the environment
+    #[arg(long, value_name = "on|off", default_value = "on", value_parser = values::on_off)]
+    #[arg(help_heading = "Image", action = clap::ArgAction::Set)]
+    pub background: bool,
     /// Shadow rays per camera sample at the first diffuse surface
     #[arg(long, value_name = "N", value_parser = values::positive_u32)]
     #[arg(help_heading = "Light transport")]

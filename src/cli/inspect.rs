@@ -74,6 +74,7 @@ fn describe(scene: &Scene, effects: &[Decision]) -> String {
         let state = if d.on { "on" } else { "skipped" };
         rows.push(("effect", format!("{:<11}{state:<9}{}", d.name, d.reason)));
     }
+    rows.extend(scene.notes.iter().map(|n| ("note", n.clone())));
     rows.extend(scene.warnings.iter().map(|w| ("warning", w.clone())));
     let mut out = String::new();
     for (name, value) in rows {

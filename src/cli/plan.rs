@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::args::{RenderArgs, SceneArgs, Units};
-use super::values::Size;
+use super::values::{Size, Sky};
 use crate::error::{Error, Result};
-use crate::import::{ImportOptions, LightUnits};
+use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits};
 use crate::integrators::IntegratorSettings;
 use crate::output::{self, OutputSettings};
 use crate::pipeline::RenderSettings;
@@ -101,6 +101,7 @@ impl Plan {
                     caustic_photons: args.caustic_photons.unwrap_or(defaults.caustic_photons),
                     nearest: args.nearest.map_or(defaults.nearest, |n| n as usize),
                     gather_rays: args.gather.unwrap_or(defaults.gather_rays),
+                    background: args.background,
                     shadow_rays: args.shadow_rays.unwrap_or(defaults.shadow_rays),
                 },
             },
@@ -148,11 +149,20 @@ impl Plan {
 pub fn import_options(args: &SceneArgs) -> ImportOptions {
     ImportOptions {
         light_units: match args.light_units {
+            Units::Auto => LightUnits::Auto,
             Units::Blender => LightUnits::Blender,
             Units::Photometric => LightUnits::Photometric,
             Units::Radiometric => LightUnits::Radiometric,
         },
         scene: args.name.clone(),
+        environment: args.environment.clone().map(|source| EnvironmentOption {
+            source: match source {
+                Sky::Image(path) => EnvironmentSource::Image(path),
+                Sky::Color(c) => EnvironmentSource::Color(c),
+            },
+            strength: args.environment_strength,
+            rotation: args.environment_rotation.to_radians(),
+        }),
     }
 }
 

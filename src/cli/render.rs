@@ -35,6 +35,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
     };
     let imported = start.elapsed().as_secs_f64();
     if !plan.quiet {
+        for note in &scene.notes {
+            console::say(format_args!("note: {note}"));
+        }
         for warning in &scene.warnings {
             console::say(format_args!("warning: {warning}"));
         }

@@ -1,5 +1,6 @@
 //! Values as they are typed: sizes, rectangles, counts, spans of time.
 
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -59,6 +60,51 @@ impl FromStr for Crop {
             ),
             Some(c) => Ok(Self(c)),
         }
+    }
+}
+
+/// Where light from all around comes from: a file, or a colour typed `R,G,B`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sky {
+    /// An image.
+    Image(PathBuf),
+    /// Radiance in W/(m²·sr).
+    Color([f64; 3]),
+}
+
+impl FromStr for Sky {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, String> {
+        let numbers: Option<Vec<f64>> = s.split(',').map(|t| t.trim().parse().ok()).collect();
+        match numbers.map(<[f64; 3]>::try_from) {
+            None => Ok(Self::Image(s.into())),
+            Some(Ok(c)) if c.iter().all(|x| (0.0..=1e30).contains(x)) => Ok(Self::Color(c)),
+            Some(_) => Err("type three numbers from 0, for instance 1,1,1, or a file".into()),
+        }
+    }
+}
+
+/// A factor from 0.
+///
+/// # Errors
+/// What to type.
+pub fn factor(s: &str) -> Result<f64, String> {
+    s.parse()
+        .ok()
+        .filter(|x| (0.0..=1e30).contains(x))
+        .ok_or_else(|| "type a number from 0, for instance 1.5".into())
+}
+
+/// `on` or `off`.
+///
+/// # Errors
+/// What to type.
+pub fn on_off(s: &str) -> Result<bool, String> {
+    match s {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("type on or off".into()),
     }
 }
 

@@ -9,8 +9,11 @@
 /// In which units a file gives the intensities of its punctual lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightUnits {
-    /// As Blender exports them: candela and lux at 683 lm/W.
+    /// By who wrote the file: as Blender exports them if it was Blender's exporter, otherwise
+    /// photometric.
     #[default]
+    Auto,
+    /// As Blender exports them: candela and lux at 683 lm/W, spots with Cycles' falloff.
     Blender,
     /// Candela and lux, as the specification says; taken at 683 lm/W too.
     Photometric,
@@ -24,7 +27,7 @@ pub const LUMENS_PER_WATT: f64 = 683.0;
 /// What an intensity or irradiance of the file is multiplied by.
 pub fn radiometric_factor(units: LightUnits) -> f64 {
     match units {
-        LightUnits::Blender | LightUnits::Photometric => 1.0 / LUMENS_PER_WATT,
+        LightUnits::Auto | LightUnits::Blender | LightUnits::Photometric => 1.0 / LUMENS_PER_WATT,
         LightUnits::Radiometric => 1.0,
     }
 }

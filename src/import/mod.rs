@@ -6,11 +6,14 @@
 
 mod accessor;
 mod buffer;
+mod camera;
 mod container;
+mod environment;
 mod image;
 mod json;
 #[cfg(feature = "ktx2")]
 mod ktx2;
+mod light;
 mod material;
 mod mesh;
 mod node;
@@ -28,6 +31,7 @@ use crate::error::{Error, Result};
 use crate::materials::MaterialDesc;
 use crate::scene::{Scene, SceneBuilder, ScenePlugins};
 use accessor::Source;
+pub use environment::{EnvironmentOption, EnvironmentSource};
 use image::Images;
 use json::Cursor;
 use node::Walker;
@@ -39,6 +43,8 @@ pub struct ImportOptions {
     pub light_units: LightUnits,
     /// Name of the scene; `None` for the file's default.
     pub scene: Option<String>,
+    /// Light from all around, instead of the file's own.
+    pub environment: Option<EnvironmentOption>,
 }
 
 /// Extensions that are honoured; a file may require them.
@@ -175,6 +181,9 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
             other => other,
         },
     })?;
+    if let Some(environment) = &options.environment {
+        builder.add_light(environment.light()?);
+    }
     for (what, n) in notes.0 {
         builder.warn(if n > 1 {
             format!("{what} ({n} times)")
@@ -248,9 +257,18 @@ fn fill<'a>(
             ..Default::default()
         })
         .map_err(|e| Failure::Plugin("the default material".into(), Box::new(e)))?;
+    let light_units = light::resolve(options.light_units, root);
+    if root.extension("KHR_lights_punctual").is_some() && options.light_units == LightUnits::Auto {
+        builder.inform(match light_units {
+            LightUnits::Blender => {
+                "lights are taken as Blender exports them: divided by 683, spots by Cycles' curve"
+            }
+            _ => "lights are taken as candela and lux, at 683 lm/W",
+        });
+    }
     let mut walker = Walker {
         source,
-        options,
+        light_units,
         materials: &materials,
         default_material,
         builder,

@@ -1,22 +1,21 @@
-//! Nodes: where things stand; lights and cameras that hang on them.
+//! Nodes: where things stand.
 
 use std::collections::HashMap;
 
 use super::accessor::Source;
 use super::json::Cursor;
 use super::mesh::Part;
-use super::{ImportOptions, Notes, Problem, mesh, tangents};
-use crate::cameras::CameraDesc;
-use crate::color::{Rgb, units};
+use super::{Notes, Problem, camera, light, mesh, tangents};
+use crate::color::units::LightUnits;
 use crate::geometry::{MaterialId, ShapeId, SphereSet, TriangleMesh};
-use crate::lights::LightDesc;
 use crate::math::{DAffine3, DMat4, DQuat, DVec3};
 use crate::scene::{MeshPlacement, SceneBuilder};
 
 /// Walks the node tree and fills the scene.
 pub(super) struct Walker<'a, 'b> {
     pub(super) source: &'b Source<'a>,
-    pub(super) options: &'b ImportOptions,
+    /// The units of the file's lights, resolved.
+    pub(super) light_units: LightUnits,
     pub(super) materials: &'b [MaterialId],
     pub(super) default_material: MaterialId,
     pub(super) builder: &'b mut SceneBuilder,
@@ -58,14 +57,15 @@ impl<'a> Walker<'a, '_> {
         }
         if let Some(at) = node.get("camera") {
             let camera = self.source.root.element("cameras", at.index()?, &at)?;
-            self.builder
-                .add_camera(camera_desc(&camera, name.clone(), world)?);
+            let desc = camera::read(&camera, name.clone(), world)?;
+            self.builder.add_camera(desc);
         }
         if let Some(at) = node
             .extension("KHR_lights_punctual")
             .and_then(|e| e.get("light"))
         {
-            self.light(&at, name.clone(), world)?;
+            let desc = light::read(self, &at, name.clone(), world)?;
+            self.builder.add_light(desc);
         }
         let Some(at) = node.get("mesh") else {
             return Ok(());
@@ -140,53 +140,6 @@ impl<'a> Walker<'a, '_> {
         }
         Ok(())
     }
-
-    fn light(&mut self, at: &Cursor<'a>, name: String, world: DAffine3) -> Result<(), Problem> {
-        let list = self
-            .source
-            .root
-            .extension("KHR_lights_punctual")
-            .ok_or_else(|| at.problem("the file declares no lights"))?;
-        let lights = list.items("lights")?;
-        let light = lights
-            .get(at.index()?)
-            .ok_or_else(|| at.problem("names a light that does not exist"))?;
-        let kind = light.need("type")?;
-        let kind = match kind.str()? {
-            "point" => "point",
-            "spot" => "spot",
-            "directional" => "directional",
-            other => {
-                let text = format!("'{other}' is no kind of light");
-                return Err(kind.problem(text));
-            }
-        };
-        let color: [f64; 3] = light.numbers_or("color", [1.0; 3])?;
-        let scale = light.number_or("intensity", 1.0)?.max(0.0)
-            * units::radiometric_factor(self.options.light_units);
-        if light.get("range").is_some() {
-            self.notes.add(
-                "the range of lights is ignored: light falls off with the square of the distance",
-                1,
-            );
-        }
-        let spot = light.get("spot");
-        let angle = |key: &str, default: f64| match &spot {
-            Some(s) => s.number_or(key, default),
-            None => Ok(default),
-        };
-        self.builder.add_light(LightDesc {
-            kind,
-            name,
-            position: world.translation,
-            direction: world.transform_vector3(DVec3::NEG_Z),
-            strength: Rgb::new(color[0], color[1], color[2]) * scale,
-            inner_cone: angle("innerConeAngle", 0.0)?,
-            outer_cone: angle("outerConeAngle", std::f64::consts::FRAC_PI_4)?,
-            ..Default::default()
-        });
-        Ok(())
-    }
 }
 
 /// The node's own transform.
@@ -209,31 +162,4 @@ fn transform(node: &Cursor<'_>) -> Result<DAffine3, Problem> {
         q,
         DVec3::from_array(t),
     ))
-}
-
-fn camera_desc(c: &Cursor<'_>, name: String, world: DAffine3) -> Result<CameraDesc, Problem> {
-    let kind = c.need("type")?;
-    let (kind, vertical, aspect) = match kind.str()? {
-        "perspective" => {
-            let p = c.need("perspective")?;
-            let aspect = p.get("aspectRatio").map(|a| a.f64()).transpose()?;
-            ("perspective", p.need("yfov")?.f64()?, aspect)
-        }
-        "orthographic" => {
-            let o = c.need("orthographic")?;
-            let (x, y) = (o.need("xmag")?.f64()?, o.need("ymag")?.f64()?);
-            ("orthographic", y, Some(x / y))
-        }
-        other => {
-            let text = format!("'{other}' is no kind of camera");
-            return Err(kind.problem(text));
-        }
-    };
-    Ok(CameraDesc {
-        name,
-        kind,
-        world_from_camera: world,
-        vertical,
-        aspect: aspect.filter(|a| a.is_finite() && *a > 0.0),
-    })
 }

@@ -1,8 +1,10 @@
 //! Next-event estimation: a sample of direct light at a surface point.
 
 use super::RenderContext;
+use crate::color::Rgb;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::materials::{Bsdf, BsdfValue};
+use crate::math::DVec3;
 
 /// The power heuristic with exponent 2 (Veach 1997, 9.2.4) for `na` samples of density `a`
 /// against `nb` of density `b`.
@@ -17,6 +19,36 @@ pub(super) fn power_heuristic(na: f64, a: f64, nb: f64, b: f64) -> f64 {
         let r = x / y;
         r * r / (1.0 + r * r)
     }
+}
+
+/// Radiance that a ray which leaves the scene sees. `last` is density and origin of the sample
+/// of the BSDF that chose it, none if no light sampling could have found the light; `n_bsdf` such
+/// samples are taken against `n_light` of lights.
+pub(super) fn escaped(
+    cx: &RenderContext<'_>,
+    ray: &Ray,
+    last: Option<(f64, DVec3)>,
+    n_bsdf: f64,
+    n_light: f64,
+) -> Rgb {
+    if cx.scene.infinite().is_empty() {
+        return Rgb::ZERO;
+    }
+    let dir = ray.direction().normalize_or_zero();
+    let mut sum = Rgb::ZERO;
+    for &id in cx.scene.infinite() {
+        let light = cx.scene.light(id);
+        let radiance = light.escaped(dir);
+        if radiance.is_black() {
+            continue;
+        }
+        let weight = last.map_or(1.0, |(pdf, from)| {
+            let pdf_light = light.pdf_escaped(dir) * cx.scene.light_probability(from, id);
+            power_heuristic(n_bsdf, pdf, n_light, pdf_light)
+        });
+        sum += radiance * weight;
+    }
+    sum
 }
 
 /// A light's contribution at a point, and the ray that must reach it.

@@ -3,6 +3,7 @@
 
 mod camera_pass;
 mod footprint;
+mod gather;
 mod light_sampling;
 mod path;
 mod photon;

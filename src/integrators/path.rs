@@ -4,7 +4,7 @@
 //! Source: Kajiya, *The Rendering Equation*, 1986; Veach 1997, chapters 8 to 10.
 
 use super::footprint::Trail;
-use super::light_sampling::{power_heuristic, sample_direct};
+use super::light_sampling::{escaped, power_heuristic, sample_direct};
 use super::{CameraRay, Integrator, IntegratorEntry, RenderContext, Scratch};
 use crate::color::Rgb;
 use crate::film::{Component, PixelSample};
@@ -88,6 +88,9 @@ impl Integrator for Path<'_> {
         scratch.rays.camera += 1;
         for depth in 0.. {
             let Some(hit) = cx.accel.intersect(&ray) else {
+                if depth > 0 || cx.settings.background {
+                    out.add(walk.component(), beta * escaped(cx, &ray, last, 1.0, 1.0));
+                }
                 break;
             };
             let sp = cx.scene.surface_point(&ray, &hit);

@@ -19,6 +19,8 @@ pub struct IntegratorSettings {
     pub gather_rays: u32,
     /// Shadow rays per camera sample at the first diffuse surface.
     pub shadow_rays: u32,
+    /// Whether the camera sees the sky behind everything; it lights the scene all the same.
+    pub background: bool,
 }
 
 impl Default for IntegratorSettings {
@@ -32,6 +34,7 @@ impl Default for IntegratorSettings {
             nearest: 50,
             gather_rays: 4,
             shadow_rays: 2,
+            background: true,
         }
     }
 }

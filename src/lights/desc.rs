@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use crate::color::Rgb;
 use crate::geometry::{Coverage, Shape};
-use crate::math::{BoundingSphere, DVec3};
+use crate::math::{BoundingSphere, DQuat, DVec3};
+
+use super::SkyImage;
 use crate::textures::Texture;
 
 /// Parameters of a light, world space, radiometric units. A kind reads what it needs.
@@ -26,6 +28,11 @@ pub struct LightDesc {
     pub inner_cone: f64,
     /// Spot: half angle in radians beyond which there is none.
     pub outer_cone: f64,
+    /// Spot: how the intensity falls from the inner to the outer cone.
+    pub spot_curve: SpotCurve,
+    /// Point and spot: distance in metres at which the light ends; infinite for the square law
+    /// alone.
+    pub range: f64,
     /// Area: corners of the triangles, front counter-clockwise; indexed as the mesh is.
     pub triangles: Vec<[DVec3; 3]>,
     /// Area: how the strength varies over the triangles, if it does.
@@ -34,8 +41,25 @@ pub struct LightDesc {
     pub spheres: Vec<BoundingSphere>,
     /// Area: whether the back emits too.
     pub double_sided: bool,
-    /// Parallel light: what it has to cover.
+    /// Directional: half the angle that the sun fills, in radians; 0 for parallel light.
+    pub angular_radius: f64,
+    /// Environment: the image that the strength multiplies; one colour if there is none.
+    pub sky: Option<Arc<SkyImage>>,
+    /// Environment: world from the image's directions.
+    pub rotation: DQuat,
+    /// Light from infinity: what it has to cover.
     pub scene: BoundingSphere,
+}
+
+/// How a spot's intensity falls from its inner to its outer cone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SpotCurve {
+    /// The square of a ramp in the cosine, as `KHR_lights_punctual` recommends.
+    #[default]
+    Gltf,
+    /// A smooth step in the cosine whose width is the share `1 − inner/outer` of the whole
+    /// cone's, as Cycles has it.
+    Cycles,
 }
 
 /// How emission varies over a surface.
@@ -84,10 +108,15 @@ impl Default for LightDesc {
             strength: Rgb::ONE,
             inner_cone: 0.0,
             outer_cone: std::f64::consts::FRAC_PI_4,
+            spot_curve: SpotCurve::Gltf,
+            range: f64::INFINITY,
             triangles: Vec::new(),
             map: None,
             spheres: Vec::new(),
             double_sided: false,
+            angular_radius: 0.0,
+            sky: None,
+            rotation: DQuat::IDENTITY,
             scene: BoundingSphere {
                 center: DVec3::ZERO,
                 radius: 0.0,

@@ -1,4 +1,5 @@
-//! `directional`: parallel light from infinity, emitted as photons over the scene's disc.
+//! `directional`: light from infinity, parallel or from a small disc of the sky, emitted as
+//! photons over the scene's disc.
 
 use std::f64::consts::PI;
 
@@ -10,27 +11,64 @@ use crate::math::{BoundingSphere, DVec3, Frame};
 use crate::sampling::warp;
 
 struct DirectionalLight {
+    /// Around the direction in which light travels.
     frame: Frame,
+    /// At normal incidence.
     irradiance: Rgb,
     scene: BoundingSphere,
+    disc: Option<Disc>,
+}
+
+/// A sun with extent.
+struct Disc {
+    /// `1 − cos` of its angular radius.
+    complement: f64,
+    radiance: Rgb,
+}
+
+impl DirectionalLight {
+    /// The direction in which light travels that `u` chooses, and its density.
+    fn sample(&self, disc: &Disc, u: [f64; 2]) -> (DVec3, f64) {
+        let local = warp::cone_from_complement(u, disc.complement);
+        (self.frame.to_world(local), warp::cone_pdf(disc.complement))
+    }
+
+    /// Whether the disc is seen along `dir`.
+    fn sees(&self, disc: &Disc, dir: DVec3) -> bool {
+        // For a small angle 1 − cos is half the squared chord: no digits are lost.
+        0.5 * (dir + self.frame.z).length_squared() <= disc.complement
+    }
 }
 
 impl Light for DirectionalLight {
     fn power(&self) -> Rgb {
-        self.irradiance * (PI * self.scene.radius * self.scene.radius)
+        // Through the disc beside the scene, beam by beam: ∫ L dω, a little more than what meets
+        // a surface across the middle of a wide sun.
+        let fluence = match &self.disc {
+            None => self.irradiance,
+            Some(disc) => disc.radiance / warp::cone_pdf(disc.complement),
+        };
+        fluence * (PI * self.scene.radius * self.scene.radius)
     }
 
     fn importance(&self, _p: DVec3) -> f64 {
         self.irradiance.luminance()
     }
 
-    fn sample_li(&self, _p: DVec3, _u: [f64; 2]) -> Option<LiSample> {
+    fn sample_li(&self, _p: DVec3, u: [f64; 2]) -> Option<LiSample> {
+        let (travel, radiance, pdf) = match &self.disc {
+            None => (self.frame.z, self.irradiance, 1.0),
+            Some(disc) => {
+                let (d, pdf) = self.sample(disc, u);
+                (d, disc.radiance, pdf)
+            }
+        };
         Some(LiSample {
-            wi: -self.frame.z,
+            wi: -travel,
             target: None,
-            radiance: self.irradiance,
-            pdf: 1.0,
-            delta: true,
+            radiance,
+            pdf,
+            delta: self.disc.is_none(),
         })
     }
 
@@ -42,10 +80,37 @@ impl Light for DirectionalLight {
         Rgb::ZERO
     }
 
-    fn distant(&self) -> Option<Distant> {
-        Some(Distant {
-            direction: self.frame.z,
-            irradiance: self.irradiance,
+    fn is_infinite(&self) -> bool {
+        self.disc.is_some()
+    }
+
+    fn escaped(&self, dir: DVec3) -> Rgb {
+        match &self.disc {
+            Some(disc) if self.sees(disc, dir) => disc.radiance,
+            _ => Rgb::ZERO,
+        }
+    }
+
+    fn pdf_escaped(&self, dir: DVec3) -> f64 {
+        match &self.disc {
+            Some(disc) if self.sees(disc, dir) => warp::cone_pdf(disc.complement),
+            _ => 0.0,
+        }
+    }
+
+    fn sample_distant(&self, u: [f64; 2]) -> Option<Distant> {
+        Some(match &self.disc {
+            None => Distant {
+                direction: self.frame.z,
+                irradiance: self.irradiance,
+            },
+            Some(disc) => {
+                let (direction, pdf) = self.sample(disc, u);
+                Distant {
+                    direction,
+                    irradiance: disc.radiance / pdf,
+                }
+            }
         })
     }
 
@@ -74,16 +139,31 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
         .direction
         .try_normalize()
         .ok_or("its direction has no length")?;
+    let angle = d.angular_radius;
+    if !(0.0..0.5 * PI).contains(&angle) {
+        return Err(format!(
+            "its angular radius {angle} is not between 0 and π/2"
+        ));
+    }
+    let disc = (angle > 0.0).then(|| {
+        let half = (0.5 * angle).sin();
+        Disc {
+            complement: 2.0 * half * half,
+            // E = ∫ L cos dω = π L sin² over the disc.
+            radiance: d.strength / (PI * angle.sin().powi(2)),
+        }
+    });
     Ok(Box::new(DirectionalLight {
         frame: Frame::from_normal(direction),
         irradiance: d.strength,
         scene: d.scene,
+        disc,
     }))
 }
 
 /// The registry's line.
 pub(super) const ENTRY: LightEntry = LightEntry {
     name: "directional",
-    doc: "parallel light from infinity",
+    doc: "light from infinity, parallel or from a small disc of the sky",
     build,
 };

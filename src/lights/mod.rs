@@ -7,11 +7,14 @@
 mod area;
 mod desc;
 mod directional;
+mod environment;
 mod point;
+mod sky;
 mod sphere;
 mod spot;
 
-pub use desc::{EmissionMap, LightDesc};
+pub use desc::{EmissionMap, LightDesc, SpotCurve};
+pub use sky::SkyImage;
 
 use crate::color::Rgb;
 use crate::geometry::{Ray, Surface, SurfacePoint};
@@ -83,13 +86,36 @@ pub trait Light: Send + Sync {
     /// the point `on` of this light; 0 for delta lights.
     fn pdf_li(&self, p: DVec3, on: &SurfacePoint) -> f64;
 
+    /// Distance in metres at which the light ends; photons are dimmed on their first segment as
+    /// [`sample_li`](Self::sample_li) is.
+    fn range(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Radiance emitted at a point of this light toward `on.sp.wo`.
     fn radiance(&self, on: &Surface<'_>) -> Rgb;
 
-    /// Parallel light, if that is what it is: photons then leave a disc beside the scene, all in
-    /// one direction.
-    fn distant(&self) -> Option<Distant> {
+    /// Light from infinity, if that is what it is: a beam of parallel light in a direction chosen
+    /// by `u`, its irradiance divided by the direction's density. Photons then leave a disc
+    /// beside the scene.
+    fn sample_distant(&self, _u: [f64; 2]) -> Option<Distant> {
         None
+    }
+
+    /// Whether it is seen by rays that leave the scene.
+    fn is_infinite(&self) -> bool {
+        false
+    }
+
+    /// Radiance seen along the unit direction `dir` by a ray that leaves the scene.
+    fn escaped(&self, _dir: DVec3) -> Rgb {
+        Rgb::ZERO
+    }
+
+    /// Density in solid angle with which [`sample_li`](Self::sample_li) finds the direction
+    /// `dir` to a light at infinity.
+    fn pdf_escaped(&self, _dir: DVec3) -> f64 {
+        0.0
     }
 
     /// A point where photons leave.
@@ -109,6 +135,13 @@ fn surface_importance(flux: f64, around: &BoundingSphere, p: DVec3) -> f64 {
     let d2 = (p - around.center).length_squared();
     let r2 = around.radius * around.radius;
     flux / (std::f64::consts::PI * d2.max(r2).max(f64::MIN_POSITIVE))
+}
+
+/// What the range of a light leaves at a distance (`KHR_lights_punctual`, the recommended
+/// window).
+#[inline]
+pub fn range_window(distance: f64, range: f64) -> f64 {
+    (1.0 - (distance / range).powi(4)).clamp(0.0, 1.0)
 }
 
 /// A light kind that can be chosen.
@@ -131,4 +164,5 @@ pub static LIGHTS: &[LightEntry] = &[
     point::ENTRY,
     spot::ENTRY,
     directional::ENTRY,
+    environment::ENTRY,
 ];

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{EmissionOrigin, LiSample, Light, LightEntry};
+use super::{EmissionOrigin, LiSample, Light, LightEntry, range_window};
 use crate::color::Rgb;
 use crate::geometry::{Surface, SurfacePoint};
 use crate::math::DVec3;
@@ -11,19 +11,26 @@ use crate::sampling::warp;
 struct PointLight {
     position: DVec3,
     intensity: Rgb,
+    range: f64,
 }
 
 /// The direct sample of a light without extent of the given intensity toward `p`.
-pub(super) fn sample_point(position: DVec3, p: DVec3, intensity: Rgb) -> Option<LiSample> {
+pub(super) fn sample_point(
+    position: DVec3,
+    p: DVec3,
+    intensity: Rgb,
+    range: f64,
+) -> Option<LiSample> {
     let to = position - p;
     let d2 = to.length_squared();
     if !(d2 > 0.0) || intensity.is_black() {
         return None;
     }
+    let d = d2.sqrt();
     Some(LiSample {
-        wi: to / d2.sqrt(),
+        wi: to / d,
         target: Some(position),
-        radiance: intensity / d2,
+        radiance: intensity * (range_window(d, range) / d2),
         pdf: 1.0,
         delta: true,
     })
@@ -50,7 +57,11 @@ impl Light for PointLight {
     }
 
     fn sample_li(&self, p: DVec3, _u: [f64; 2]) -> Option<LiSample> {
-        sample_point(self.position, p, self.intensity)
+        sample_point(self.position, p, self.intensity, self.range)
+    }
+
+    fn range(&self) -> f64 {
+        self.range
     }
 
     fn pdf_li(&self, _p: DVec3, _on: &SurfacePoint) -> f64 {
@@ -82,6 +93,7 @@ pub(super) const ENTRY: LightEntry = LightEntry {
         Ok(Box::new(PointLight {
             position: d.position,
             intensity: d.strength,
+            range: d.range,
         }))
     },
 };

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::point::{point_origin, sample_point};
-use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry};
+use super::{EmissionOrigin, LiSample, Light, LightDesc, LightEntry, SpotCurve};
 use crate::color::Rgb;
 use crate::geometry::{Surface, SurfacePoint};
 use crate::math::{DVec3, Frame};
@@ -13,8 +13,11 @@ struct SpotLight {
     position: DVec3,
     frame: Frame,
     intensity: Rgb,
-    cos_inner: f64,
     cos_outer: f64,
+    /// Width of the falloff in the cosine.
+    ramp: f64,
+    curve: SpotCurve,
+    range: f64,
 }
 
 impl SpotLight {
@@ -25,13 +28,15 @@ impl SpotLight {
             return 0.0;
         }
         // A hard edge has no ramp to divide by.
-        let ramp = self.cos_inner - self.cos_outer;
-        let t = if ramp > 0.0 {
-            ((cos - self.cos_outer) / ramp).min(1.0)
+        let t = if self.ramp > 0.0 {
+            ((cos - self.cos_outer) / self.ramp).min(1.0)
         } else {
             1.0
         };
-        t * t
+        match self.curve {
+            SpotCurve::Gltf => t * t,
+            SpotCurve::Cycles => t * t * (3.0 - 2.0 * t),
+        }
     }
 
     #[inline]
@@ -42,10 +47,12 @@ impl SpotLight {
 
 impl Light for SpotLight {
     fn power(&self) -> Rgb {
-        // ∫ falloff dω = 2π [(1 − cos_inner) + (cos_inner − cos_outer)/3].
-        let core = 1.0 - self.cos_inner;
-        let ramp = (self.cos_inner - self.cos_outer) / 3.0;
-        self.intensity * (2.0 * PI * (core + ramp))
+        // ∫ falloff dω = 2π [(1 − cos_outer) − ramp · (1 − ∫ of the curve over 0..1)].
+        let lost = match self.curve {
+            SpotCurve::Gltf => 2.0 / 3.0,
+            SpotCurve::Cycles => 0.5,
+        };
+        self.intensity * (2.0 * PI * (1.0 - self.cos_outer - self.ramp * lost))
     }
 
     fn importance(&self, p: DVec3) -> f64 {
@@ -56,7 +63,11 @@ impl Light for SpotLight {
 
     fn sample_li(&self, p: DVec3, _u: [f64; 2]) -> Option<LiSample> {
         let dir = (p - self.position).try_normalize()?;
-        sample_point(self.position, p, self.toward(dir))
+        sample_point(self.position, p, self.toward(dir), self.range)
+    }
+
+    fn range(&self) -> f64 {
+        self.range
     }
 
     fn pdf_li(&self, _p: DVec3, _on: &SurfacePoint) -> f64 {
@@ -93,12 +104,19 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
             d.inner_cone, d.outer_cone
         ));
     }
+    let cos_outer = d.outer_cone.cos();
+    let inner = d.inner_cone.min(d.outer_cone);
     Ok(Box::new(SpotLight {
         position: d.position,
         frame: Frame::from_normal(direction),
         intensity: d.strength,
-        cos_inner: d.inner_cone.min(d.outer_cone).cos(),
-        cos_outer: d.outer_cone.cos(),
+        cos_outer,
+        ramp: match d.spot_curve {
+            SpotCurve::Gltf => inner.cos() - cos_outer,
+            SpotCurve::Cycles => (1.0 - cos_outer) * (1.0 - inner / d.outer_cone),
+        },
+        curve: d.spot_curve,
+        range: d.range,
     }))
 }
 

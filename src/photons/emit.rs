@@ -22,6 +22,8 @@ pub struct EmittedPhoton {
     pub ray: Ray,
     /// Its flux in W.
     pub power: Rgb,
+    /// The range of its light in metres.
+    pub range: f64,
 }
 
 /// What an emission is made for.

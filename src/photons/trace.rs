@@ -8,6 +8,7 @@ use super::photon::{Photon, PhotonClass};
 use super::{EmittedPhoton, PhotonSettings};
 use crate::accel::Accelerator;
 use crate::control::Control;
+use crate::lights::range_window;
 use crate::materials::{LobeClass, TransportMode};
 use crate::sampling::{Rng, hash2, stream};
 use crate::scene::Scene;
@@ -121,6 +122,11 @@ impl Tracer<'_> {
                 return;
             };
             let sp = self.scene.surface_point(&ray, &hit);
+            if depth == 1 && photon.range < f64::INFINITY {
+                let left = power * range_window(sp.distance, photon.range);
+                out.ledger.absorbed += power - left;
+                power = left;
+            }
             if let Some(t) = self.scene.transmittance(&sp) {
                 let left = power * t;
                 out.ledger.absorbed += power - left;

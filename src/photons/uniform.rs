@@ -1,11 +1,14 @@
 //! `uniform`: the conventional emission. Photons are shared among the lights by flux, and each
 //! light's photons are stratified over its surface and its directions.
 
+use std::f64::consts::PI;
+
 use super::emit::{EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
 use super::targets::Targets;
 use crate::geometry::{LightId, Ray};
 use crate::lights::Light;
-use crate::sampling::{Sampler, stream};
+use crate::math::Frame;
+use crate::sampling::{Sampler, stream, warp};
 use crate::scene::Scene;
 
 struct Uniform<'a> {
@@ -29,7 +32,7 @@ impl PhotonSource for Uniform<'_> {
         let light = self.scene.light(LightId(k as u32));
         let mut sampler = Sampler::new(self.seed, self.stream, k as u64, i - self.first[k]);
         let photon = match &self.targets {
-            None => leave(light, &mut sampler),
+            None => leave(light, self.scene, &mut sampler),
             Some(targets) => leave_toward(light, targets, self.scene, &mut sampler),
         }?;
         Some(EmittedPhoton {
@@ -40,13 +43,28 @@ impl PhotonSource for Uniform<'_> {
 }
 
 /// A photon of a light that emits one photon only.
-fn leave(light: &dyn Light, sampler: &mut Sampler) -> Option<EmittedPhoton> {
-    let from = light.sample_origin(sampler.next_2d())?;
+fn leave(light: &dyn Light, scene: &Scene, sampler: &mut Sampler) -> Option<EmittedPhoton> {
+    let u = sampler.next_2d();
+    if let Some(distant) = light.sample_distant(u) {
+        // Beside the scene, on the disc that its shadow fills.
+        let around = scene.bounds.bounding_sphere();
+        let radius = around.radius * (1.0 + 1e-6);
+        let frame = Frame::from_normal(distant.direction);
+        let [x, y] = warp::disc(sampler.next_2d());
+        let p = around.center + (frame.x * x + frame.y * y - frame.z) * radius;
+        return Some(EmittedPhoton {
+            ray: Ray::new(p, distant.direction),
+            power: distant.irradiance * (PI * radius * radius),
+            range: f64::INFINITY,
+        });
+    }
+    let from = light.sample_origin(u)?;
     let (dir, pdf) = light.sample_direction(&from, sampler.next_2d());
     let power = light.emitted(&from, dir) / (from.pdf_area * pdf);
     (!power.is_black()).then(|| EmittedPhoton {
         ray: from.ray(dir),
         power,
+        range: light.range(),
     })
 }
 
@@ -57,7 +75,8 @@ fn leave_toward(
     scene: &Scene,
     sampler: &mut Sampler,
 ) -> Option<EmittedPhoton> {
-    if let Some(distant) = light.distant() {
+    let u = sampler.next_2d();
+    if let Some(distant) = light.sample_distant(u) {
         let (p, pdf) = targets.sample_disc(distant.direction, sampler.next_2d())?;
         // From beside the target back out of the scene.
         let around = scene.bounds.bounding_sphere();
@@ -66,14 +85,16 @@ fn leave_toward(
         return Some(EmittedPhoton {
             ray,
             power: distant.irradiance / pdf,
+            range: f64::INFINITY,
         });
     }
-    let from = light.sample_origin(sampler.next_2d())?;
+    let from = light.sample_origin(u)?;
     let (dir, pdf) = targets.sample_direction(from.p, sampler.next_2d())?;
     let power = light.emitted(&from, dir) / (from.pdf_area * pdf);
     (!power.is_black()).then(|| EmittedPhoton {
         ray: from.ray(dir),
         power,
+        range: light.range(),
     })
 }
 

@@ -7,6 +7,7 @@
 
 use std::sync::Arc;
 
+use super::emitters::{surface_light, vary};
 use super::{LightChoice, Scene};
 use crate::cameras::CameraDesc;
 use crate::color::Rgb;
@@ -16,7 +17,7 @@ use crate::geometry::{
     Coverage, Geometry, Invalid, LightId, MaterialId, Object, ObjectId, Placement, Shape, ShapeId,
     SphereSet, TriangleMesh,
 };
-use crate::lights::{EmissionMap, LightDesc, LightEntry};
+use crate::lights::{LightDesc, LightEntry};
 use crate::materials::{Material, MaterialDesc, MaterialEntry};
 use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3, Vec3};
 use crate::registry::Table;
@@ -80,6 +81,7 @@ pub struct SceneBuilder {
     lights: Vec<LightDesc>,
     cameras: Vec<CameraDesc>,
     warnings: Vec<String>,
+    notes: Vec<String>,
 }
 
 impl SceneBuilder {
@@ -94,6 +96,11 @@ impl SceneBuilder {
     /// Adds something the user should know.
     pub fn warn(&mut self, message: impl Into<String>) {
         self.warnings.push(message.into());
+    }
+
+    /// Adds a decision the user may like to know.
+    pub fn inform(&mut self, message: impl Into<String>) {
+        self.notes.push(message.into());
     }
 
     /// Adds triangles in their own space; `name` is for the warning about dropped ones.
@@ -208,6 +215,7 @@ impl SceneBuilder {
             bounds,
             center,
             warnings: self.warnings,
+            notes: self.notes,
         })
     }
 
@@ -356,65 +364,6 @@ impl SceneBuilder {
             names.push((d.name, d.kind));
         }
         Ok((lights, names, geometry))
-    }
-}
-
-/// Lets the strength of a surface that emits follow its texture and its alpha. Spheres take
-/// their means.
-fn vary(desc: &mut LightDesc, geometry: &Geometry, object: &Object, emission: &Emission) {
-    if emission.texture.is_none() && object.coverage.is_none() {
-        return;
-    }
-    let shape = geometry.shape(object.shape);
-    match shape {
-        Shape::Mesh(_) => {
-            desc.map = Some(EmissionMap {
-                shape: Arc::new(shape.clone()),
-                texture: emission.texture.clone(),
-                coverage: object.coverage.clone(),
-            });
-        }
-        Shape::Spheres(_) => {
-            if let Some(texture) = &emission.texture {
-                let [r, g, b, _] = texture.mean();
-                desc.strength *= Rgb::new(r, g, b);
-            }
-        }
-    }
-}
-
-/// World-space triangles or spheres of an emitting object.
-fn surface_light(geometry: &Geometry, id: ObjectId) -> LightDesc {
-    let object = geometry.object(id);
-    let world = object
-        .placement
-        .map_or(DAffine3::IDENTITY, |p| p.world_from_object);
-    // Mirrored triangles turn over, so that their front stays the front.
-    let flip = world.matrix3.determinant() < 0.0;
-    match geometry.shape(object.shape) {
-        Shape::Mesh(mesh) => LightDesc {
-            kind: "area",
-            triangles: (0..mesh.indices.len() as u32)
-                .map(|i| {
-                    let [a, b, c] = mesh.corners(i).map(|p| world.transform_point3(p));
-                    if flip { [a, c, b] } else { [a, b, c] }
-                })
-                .collect(),
-            ..Default::default()
-        },
-        Shape::Spheres(set) => LightDesc {
-            kind: "sphere",
-            spheres: (0..set.spheres.len() as u32)
-                .map(|i| {
-                    let (c, r) = set.get(i);
-                    BoundingSphere {
-                        center: world.transform_point3(c),
-                        radius: r,
-                    }
-                })
-                .collect(),
-            ..Default::default()
-        },
     }
 }
 

@@ -2,6 +2,7 @@
 
 use arrayvec::ArrayVec;
 
+use crate::geometry::LightId;
 use crate::lights::Light;
 use crate::math::DVec3;
 use crate::sampling::Discrete;
@@ -17,6 +18,7 @@ const EVEN: f64 = 0.1;
 #[derive(Clone, Debug, Default)]
 pub struct LightChoice {
     by_flux: Discrete,
+    infinite: Vec<LightId>,
     n: usize,
 }
 
@@ -28,8 +30,17 @@ impl LightChoice {
     pub fn new(lights: &[Box<dyn Light>]) -> Self {
         Self {
             by_flux: Discrete::new(lights.iter().map(|l| l.power().luminance())),
+            infinite: (0..lights.len())
+                .filter(|&i| lights[i].is_infinite())
+                .map(|i| LightId(i as u32))
+                .collect(),
             n: lights.len(),
         }
+    }
+
+    /// The lights at infinity that rays see.
+    pub(super) fn infinite(&self) -> &[LightId] {
+        &self.infinite
     }
 
     /// Probabilities at `p`; `None` if no light reaches it.

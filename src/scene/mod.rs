@@ -2,6 +2,7 @@
 
 mod builder;
 mod census;
+mod emitters;
 mod light_choice;
 
 pub use builder::{Emission, MeshPlacement, SceneBuilder, ScenePlugins};
@@ -42,6 +43,8 @@ pub struct Scene {
     pub center: DVec3,
     /// What was dropped or could not be honoured, for the user.
     pub warnings: Vec<String>,
+    /// What was decided on the way, for the user.
+    pub notes: Vec<String>,
 }
 
 impl Scene {
@@ -105,11 +108,20 @@ impl Scene {
     #[inline]
     pub fn pdf_light(&self, from: DVec3, on: &SurfacePoint) -> f64 {
         on.light.map_or(0.0, |id| {
-            let pick = self
-                .choose_light
-                .probability(&self.lights, from, id.index());
-            self.light(id).pdf_li(from, on) * pick
+            self.light(id).pdf_li(from, on) * self.light_probability(from, id)
         })
+    }
+
+    /// The lights that rays see which leave the scene.
+    #[inline]
+    pub fn infinite(&self) -> &[LightId] {
+        self.choose_light.infinite()
+    }
+
+    /// Probability that [`pick_light`](Self::pick_light) chooses `id` at `p`.
+    #[inline]
+    pub fn light_probability(&self, p: DVec3, id: LightId) -> f64 {
+        self.choose_light.probability(&self.lights, p, id.index())
     }
 
     /// Chooses a light for a shading point by `u`: which, its probability, and `u` rescaled.
