@@ -81,12 +81,22 @@ pub fn render(
     registry: &Registry,
     control: &Control,
 ) -> Result<Rendering> {
-    let threads = settings.threads.unwrap_or(0);
+    in_pool(settings.threads, || {
+        render_in_pool(scene, settings, registry, control)
+    })?
+}
+
+/// Does work with a number of threads, one per processor if none is given.
+///
+/// # Errors
+/// More threads than the system has room for.
+pub fn in_pool<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T> {
+    let threads = threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .map_err(|e| Error::Usage(format!("--threads {threads}: {e}; ask for fewer")))?;
-    pool.install(|| render_in_pool(scene, settings, registry, control))
+    Ok(pool.install(work))
 }
 
 fn render_in_pool(
@@ -202,7 +212,11 @@ fn components(set: EffectSet) -> Vec<Component> {
         .collect()
 }
 
-fn choose_camera(
+/// The camera that the settings name, or the first of the scene.
+///
+/// # Errors
+/// A name that no camera has, a scene without a camera.
+pub fn choose_camera(
     scene: &Scene,
     settings: &RenderSettings,
     registry: &Registry,

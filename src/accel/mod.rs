@@ -14,9 +14,12 @@
 //!   for the same ray.
 
 mod bvh;
+mod crosscheck;
 #[cfg(feature = "embree")]
 mod embree;
 mod linear;
+
+pub use crosscheck::{Class, CrossCheck, Finding};
 
 use std::sync::Arc;
 

@@ -17,8 +17,9 @@ Examples:
   dualight render scene.glb -o scene.exr -o scene.png
   dualight render scene.glb -o out.png --size 1920x1080 --spp 64 --photons 5M --time-limit 10m
   dualight diff out.exr reference.exr -o error.png
+  dualight compare scene.glb --rays 10M
 
-Exit status: 0 done, 1 rendering or reading or writing failed, 2 usage, 3 the file requires \
+Exit status: 0 done, 1 rendering or reading or writing failed or backends differ, 2 usage, 3 the file requires \
 something unsupported, 4 stopped at the time limit with a valid image, 130 interrupted.")]
 pub struct Cli {
     /// What to do.
@@ -44,6 +45,8 @@ pub enum Command {
     Plugins,
     /// Tell how far an image is from a reference
     Diff(DiffArgs),
+    /// Compare two ray tracing backends on the same rays; every difference is explained or a bug
+    Compare(CompareArgs),
 }
 
 /// What the numbers of a file's lights mean.
@@ -227,6 +230,47 @@ pub struct DiffArgs {
     /// Print the numbers as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Options of `dualight compare`.
+#[derive(Clone, Debug, Args)]
+pub struct CompareArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as the help of the command")]
+    pub scene: SceneArgs,
+    /// Rays in all: camera, shadow, photon, bounced, random, and aimed at edges; 10M is understood
+    #[arg(long, value_name = "N", default_value = "1M", value_parser = values::count)]
+    pub rays: u64,
+    /// Backend to judge [default: the first of dualight plugins]
+    #[arg(long, value_name = "NAME")]
+    pub accel: Option<String>,
+    /// Backend to judge it by, which is taken to be exact [default: bvh; for bvh: linear]
+    #[arg(long, value_name = "NAME")]
+    pub reference: Option<String>,
+    /// Samples per pixel of the two pictures; 0 renders none
+    #[arg(long, value_name = "N", default_value = "4")]
+    pub spp: u32,
+    /// Size of the two pictures in pixels [default: 128 wide, as high as the camera asks for]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// How many of the worst rays the report lists
+    #[arg(long, value_name = "N", default_value = "10")]
+    pub worst: u32,
+    /// Ask again about the worst rays of a report instead of new ones
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["rays", "worst"])]
+    pub replay: Option<PathBuf>,
+    /// Write the report as JSON to FILE, or to standard output without one
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    pub json: Option<Option<PathBuf>>,
+    /// Print nothing but the report and errors
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Threads [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = values::positive_u32)]
+    pub threads: Option<u32>,
 }
 
 /// What to say when there is nothing to run: text that was asked for, or an error in one line.

@@ -2,6 +2,7 @@
 //! command.
 
 pub mod args;
+mod compare;
 mod console;
 mod diff;
 mod format;
@@ -25,6 +26,8 @@ use args::{Cli, Command};
 pub enum Ending {
     /// All was done.
     Done,
+    /// All was done, and what was to be the same is not.
+    Different,
     /// It was stopped, and what there was by then is written.
     Partial(Stopped),
     /// It was stopped before there was anything to write.
@@ -36,6 +39,7 @@ impl Ending {
     pub fn exit_code(self) -> u8 {
         match self {
             Self::Done => 0,
+            Self::Different => 1,
             Self::Partial(Stopped::TimeLimit) => 4,
             Self::Empty(Stopped::TimeLimit) => 1,
             Self::Partial(Stopped::Interrupted) | Self::Empty(Stopped::Interrupted) => 130,
@@ -53,5 +57,6 @@ pub fn run(cli: &Cli) -> Result<Ending> {
         Command::Inspect(args) => inspect::run(args),
         Command::Plugins => plugins::run(),
         Command::Diff(args) => diff::run(args),
+        Command::Compare(args) => compare::run(args),
     }
 }

@@ -183,7 +183,7 @@ fn check_effects(wish: &str, registry: &Registry) -> Result<()> {
 }
 
 /// The size of an image for a camera of the given aspect, if it has one.
-fn default_size(aspect: Option<f64>) -> Size {
+pub(super) fn default_size(aspect: Option<f64>) -> Size {
     let aspect = aspect.filter(|a| a.is_finite() && *a > 0.0).unwrap_or(1.0);
     let height = (f64::from(DEFAULT_WIDTH) / aspect).round();
     Size {

@@ -1,8 +1,10 @@
 //! Reports about images and runs: what numbers say about them.
 
+pub mod agreement;
 pub mod diff;
 mod error_image;
 #[cfg(feature = "flip")]
 mod flip;
+pub mod rays;
 
 pub use error_image::{ErrorMap, error_image};
