@@ -12,12 +12,13 @@ use std::f64::consts::PI;
 
 use common::stats::Samples;
 use common::{add_disc, add_quad, add_sphere, lamp, light};
+use dualight::accel::ACCELERATORS;
 use dualight::color::Rgb;
-use dualight::geometry::Ray;
+use dualight::geometry::{Ray, SphereSet};
 use dualight::lights::{LIGHTS, Light, LightDesc};
-use dualight::math::{BoundingSphere, DVec3};
-use dualight::sampling::{Rng, hash2};
-use dualight::scene::{Scene, SceneBuilder};
+use dualight::math::{BoundingSphere, DAffine3, DMat3, DQuat, DVec3, Frame};
+use dualight::sampling::{Rng, hash2, warp};
+use dualight::scene::{MeshPlacement, Scene, SceneBuilder};
 
 const SEEDS: u64 = 32;
 
@@ -64,6 +65,21 @@ fn zoo() -> Vec<(String, Box<dyn Light>, Rgb)> {
                 add(", both sides", both, 4.0 * PI);
             }
             "sphere" => add("", base.clone(), PI * 4.0 * PI * 1.25),
+            "ellipsoid" => {
+                // Prolate spheroids with axes 1 : 1 : 2 of the same spheres.
+                let world = DAffine3::from_scale_rotation_translation(
+                    DVec3::new(-1.0, 1.0, 2.0),
+                    DQuat::from_axis_angle(DVec3::ONE.normalize(), 1.0),
+                    DVec3::NEG_Y,
+                );
+                let e = 0.75f64.sqrt();
+                let growth = 0.5 * (1.0 + 2.0 / e * e.asin());
+                let desc = LightDesc {
+                    world,
+                    ..base.clone()
+                };
+                add("", desc, PI * 4.0 * PI * 1.25 * growth);
+            }
             "point" => add("", base.clone(), 4.0 * PI),
             "directional" => add("", base.clone(), 9.0 * PI),
             // Radiance 1 through the disc from every direction.
@@ -311,6 +327,85 @@ fn a_sphere_lights_like_a_point_of_its_intensity() {
         let p = UP * (2.0 - d);
         let e = Samples::over_seeds(SEEDS, |s| irradiance(&scene, p, UP, s, 5000));
         e.assert_mean(&format!("sphere at {d}"), PI * (0.5 / d).powi(2), 0.005);
+    }
+}
+
+/// A ball that a node stretches emits from the surface that rays meet: light sampling, and rays
+/// of every backend, find the same irradiance, and the densities agree point by point.
+#[test]
+fn a_stretched_ball_lights_as_it_is_seen() {
+    let maps = [
+        (DVec3::new(1.0, 0.2, 2.0), 0.7),
+        (DVec3::new(-0.5, 1.0, 0.1), -1.1),
+        (DVec3::new(0.3, 0.3, 0.6), 0.0),
+    ];
+    for (k, (scale, angle)) in maps.into_iter().enumerate() {
+        let turn = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), angle);
+        let shear = DAffine3::from_mat3(DMat3::from_cols(
+            DVec3::X,
+            DVec3::new(0.4, 1.0, 0.0),
+            DVec3::Z,
+        ));
+        let world =
+            DAffine3::from_scale_rotation_translation(scale, turn, DVec3::new(0.3, 2.5, -0.2))
+                * shear;
+        let scene = lit(|b| {
+            let m = b.add_material(&lamp(Rgb::ONE)).expect("a lamp");
+            let set = SphereSet {
+                spheres: vec![[0.2, 0.0, 0.1, 0.8]],
+            };
+            let shape = b.add_spheres(set, "ball");
+            b.place(MeshPlacement {
+                shape,
+                material: m,
+                world_from_object: world,
+                name: "ball".into(),
+            });
+        });
+        assert_eq!(scene.light_names[0].1, "ellipsoid");
+        let light = &scene.lights[0];
+        let by_light = Samples::over_seeds(SEEDS, |s| irradiance(&scene, DVec3::ZERO, UP, s, 5000));
+        for entry in ACCELERATORS {
+            let accel = (entry.build)(&scene.geometry, 1).expect("builds");
+            let frame = Frame::from_normal(UP);
+            let by_rays = Samples::over_seeds(SEEDS, |seed| {
+                let mut rng = Rng::new(hash2(seed, 4));
+                let mut sum = 0.0;
+                for _ in 0..20_000 {
+                    let d = frame.to_world(warp::cosine_hemisphere(rng.next_2d()));
+                    let ray = Ray::new(-scene.center, d);
+                    if let Some(hit) = accel.intersect(&ray) {
+                        let sp = scene.surface_point(&ray, &hit);
+                        sum += scene.emitted(&sp, None).r * PI / 20_000.0;
+                    }
+                }
+                sum
+            });
+            let what = format!("stretched ball {k}, light against {}", entry.name);
+            by_light.assert_agrees(&by_rays, &what, 0.01, 0.0);
+            let mut rng = Rng::new(6);
+            for _ in 0..1000 {
+                let Some(li) = light.sample_li(-scene.center, rng.next_2d()) else {
+                    continue;
+                };
+                let ray = Ray::new(-scene.center, li.wi);
+                // At the rim a ray may miss by its rounding.
+                let Some(hit) = accel.intersect(&ray) else {
+                    continue;
+                };
+                let sp = scene.surface_point(&ray, &hit);
+                let pdf = light.pdf_li(-scene.center, &sp);
+                assert!(
+                    (pdf / li.pdf - 1.0).abs() < 1e-5,
+                    "{what}: {pdf} {}",
+                    li.pdf
+                );
+                let target = li.target.expect("a surface");
+                let off = (target - sp.p).length();
+                let cos = sp.ng.dot(sp.wo);
+                assert!(cos < 0.01 || off < 1e-4, "{what}: {off}");
+            }
+        }
     }
 }
 

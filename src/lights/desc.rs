@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::color::Rgb;
 use crate::geometry::{Coverage, Shape};
-use crate::math::{BoundingSphere, DQuat, DVec3};
+use crate::math::{BoundingSphere, DAffine3, DQuat, DVec3};
 
 use super::SkyImage;
 use crate::textures::Texture;
@@ -37,8 +37,10 @@ pub struct LightDesc {
     pub triangles: Vec<[DVec3; 3]>,
     /// Area: how the strength varies over the triangles, if it does.
     pub map: Option<EmissionMap>,
-    /// Sphere: centre and radius of each sphere; indexed as the set is.
+    /// Sphere and ellipsoid: centre and radius of each sphere; indexed as the set is.
     pub spheres: Vec<BoundingSphere>,
+    /// Ellipsoid: what carries the spheres into the world.
+    pub world: DAffine3,
     /// Area: whether the back emits too.
     pub double_sided: bool,
     /// Directional: half the angle that the sun fills, in radians; 0 for parallel light.
@@ -113,6 +115,7 @@ impl Default for LightDesc {
             triangles: Vec::new(),
             map: None,
             spheres: Vec::new(),
+            world: DAffine3::IDENTITY,
             double_sided: false,
             angular_radius: 0.0,
             sky: None,

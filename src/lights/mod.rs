@@ -7,6 +7,7 @@
 mod area;
 mod desc;
 mod directional;
+mod ellipsoid;
 mod environment;
 mod point;
 mod sky;
@@ -161,6 +162,7 @@ crate::registry::impl_entry!(LightEntry, "light");
 pub static LIGHTS: &[LightEntry] = &[
     area::ENTRY,
     sphere::ENTRY,
+    ellipsoid::ENTRY,
     point::ENTRY,
     spot::ENTRY,
     directional::ENTRY,

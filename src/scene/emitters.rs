@@ -57,16 +57,19 @@ pub(super) fn surface_light(geometry: &Geometry, id: ObjectId) -> LightDesc {
             ..Default::default()
         },
         Shape::Spheres(set) => LightDesc {
-            kind: "sphere",
+            // Spheres that stay round are in world space already.
+            kind: if object.placement.is_some() {
+                "ellipsoid"
+            } else {
+                "sphere"
+            },
             spheres: (0..set.spheres.len() as u32)
                 .map(|i| {
-                    let (c, r) = set.get(i);
-                    BoundingSphere {
-                        center: world.transform_point3(c),
-                        radius: r,
-                    }
+                    let (center, radius) = set.get(i);
+                    BoundingSphere { center, radius }
                 })
                 .collect(),
+            world,
             ..Default::default()
         },
     }
