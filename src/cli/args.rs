@@ -88,6 +88,23 @@ pub struct SceneArgs {
     /// Scene within the file, if it holds several [default: the file's default]
     #[arg(long = "scene", value_name = "NAME")]
     pub name: Option<String>,
+    /// Show animations at this moment, in seconds [default: the rest pose]
+    #[arg(long, value_name = "SECONDS", value_parser = values::moment, group = "moment")]
+    #[arg(allow_negative_numbers = true)]
+    pub time: Option<f64>,
+    /// Show animations at this frame; the same as --time N/FPS
+    #[arg(long, value_name = "N", value_parser = values::moment, group = "moment")]
+    #[arg(allow_negative_numbers = true)]
+    pub frame: Option<f64>,
+    /// Frames in a second [default: 24, as Blender's]
+    #[arg(long, value_name = "FPS", value_parser = values::rate, requires = "frame")]
+    pub fps: Option<f64>,
+    /// Show one animation alone; needs --time or --frame [default: all of them]
+    #[arg(long, value_name = "NAME", requires = "moment")]
+    pub animation: Option<String>,
+    /// Variant of the materials, if the file has any [default: the file's default]
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
 }
 
 /// Options of `dualight render`.
@@ -378,6 +395,10 @@ mod tests {
             ("dualight render s.glb", "--output <FILE>"),
             ("dualight render -o a.png", "<SCENE>"),
             ("dualight rendr", "'render'"),
+            ("dualight inspect s.glb --time 1 --frame 2", "--frame"),
+            ("dualight inspect s.glb --time 1 --fps 24", "--f"),
+            ("dualight inspect s.glb --animation Walk", "--time"),
+            ("dualight inspect s.glb --frame 1 --fps 0", "frames"),
             ("dualight diff a.exr b.exr --error-map flip", "--output"),
             (
                 "dualight render s.glb -o a.png --light-units lux",

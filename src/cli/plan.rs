@@ -20,6 +20,9 @@ const DEFAULT_WIDTH: u32 = 512;
 /// Largest height that a camera's aspect leads to; who wants more gives a size.
 const MAX_DEFAULT_HEIGHT: f64 = 8192.0;
 
+/// Frames in a second where nothing else is said: Blender's default.
+const DEFAULT_FPS: f64 = 24.0;
+
 /// Where statistics go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StatisticsTarget {
@@ -155,6 +158,11 @@ pub fn import_options(args: &SceneArgs) -> ImportOptions {
             Units::Radiometric => LightUnits::Radiometric,
         },
         scene: args.name.clone(),
+        time: args
+            .time
+            .or_else(|| Some(args.frame? / args.fps.unwrap_or(DEFAULT_FPS))),
+        animation: args.animation.clone(),
+        variant: args.variant.clone(),
         environment: args.environment.clone().map(|source| EnvironmentOption {
             source: match source {
                 Sky::Image(path) => EnvironmentSource::Image(path),

@@ -96,6 +96,28 @@ pub fn factor(s: &str) -> Result<f64, String> {
         .ok_or_else(|| "type a number from 0, for instance 1.5".into())
 }
 
+/// A moment, in seconds or frames.
+///
+/// # Errors
+/// What to type.
+pub fn moment(s: &str) -> Result<f64, String> {
+    s.parse()
+        .ok()
+        .filter(|x: &f64| x.abs() <= 1e9)
+        .ok_or_else(|| "type a number, for instance 1.5".into())
+}
+
+/// Frames in a second.
+///
+/// # Errors
+/// What to type.
+pub fn rate(s: &str) -> Result<f64, String> {
+    s.parse()
+        .ok()
+        .filter(|x| (1e-3..=1e6).contains(x))
+        .ok_or_else(|| "type a number of frames, for instance 24".into())
+}
+
 /// `on` or `off`.
 ///
 /// # Errors

@@ -2,8 +2,9 @@
 
 use super::accessor::Source;
 use super::json::Cursor;
+use super::skin::Skin;
 use super::vertices::{Attributes, Vertices};
-use super::{Notes, Problem};
+use super::{Notes, Problem, morph};
 use crate::geometry::{SphereSet, TriangleMesh};
 
 /// What a primitive is made of.
@@ -14,10 +15,20 @@ pub(super) enum Part {
     Spheres(SphereSet),
 }
 
+/// What bends a primitive out of its rest shape.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Shaping<'s> {
+    /// Weights of the morph targets; those that are missing are zero.
+    pub(super) weights: &'s [f64],
+    /// Joints that carry the vertices.
+    pub(super) skin: Option<&'s Skin>,
+}
+
 /// Reads a primitive; `None` if it makes no surface.
 pub(super) fn read<'a>(
     p: &Cursor<'a>,
     source: &Source<'a>,
+    shaping: Shaping<'_>,
     notes: &mut Notes,
 ) -> Result<Option<Part>, Problem> {
     let mode = p.index_or("mode", 4)?;
@@ -39,12 +50,6 @@ pub(super) fn read<'a>(
         }
         other => return Err(p.need("mode")?.problem(format!("{other} is no mode"))),
     }
-    if p.get("targets").is_some() {
-        notes.add(
-            "morph targets are not supported yet: the rest shape is used",
-            1,
-        );
-    }
     let mut attributes = Attributes {
         count: source.accessor(&position)?.count,
         source,
@@ -52,18 +57,29 @@ pub(super) fn read<'a>(
         pick: None,
     };
     let order = order(p, &mut attributes, &position)?;
-    let vertices = attributes.vertices()?;
-    Ok(Some(match mode {
-        0 => Part::Spheres(spheres(&vertices, order)),
-        _ => Part::Mesh(TriangleMesh {
-            indices: triangles(order, vertices.positions.len(), mode),
-            positions: vertices.positions,
-            normals: vertices.normals,
-            uv_sets: vertices.uv_sets,
-            colors: vertices.colors,
-            tangents: vertices.tangents,
-        }),
-    }))
+    let mut vertices = attributes.vertices()?;
+    morph::apply(p, &attributes, shaping.weights, &mut vertices)?;
+    let mirrored = match shaping.skin {
+        Some(skin) => skin.apply(&attributes, &mut vertices)?,
+        None => false,
+    };
+    if mode == 0 {
+        return Ok(Some(Part::Spheres(spheres(&vertices, order))));
+    }
+    let mut indices = triangles(order, vertices.positions.len(), mode);
+    if mirrored {
+        for [_, b, c] in &mut indices {
+            std::mem::swap(b, c);
+        }
+    }
+    Ok(Some(Part::Mesh(TriangleMesh {
+        indices,
+        positions: vertices.positions,
+        normals: vertices.normals,
+        uv_sets: vertices.uv_sets,
+        colors: vertices.colors,
+        tangents: vertices.tangents,
+    })))
 }
 
 /// The indices of a primitive, if it has any. Where they name fewer vertices than there are, as

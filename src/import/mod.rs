@@ -5,10 +5,12 @@
 //! not supported is named in a warning; what a file *requires* and is not supported is an error.
 
 mod accessor;
+mod animation;
 mod buffer;
 mod camera;
 mod container;
 mod environment;
+mod hierarchy;
 mod image;
 mod json;
 #[cfg(feature = "ktx2")]
@@ -16,10 +18,13 @@ mod ktx2;
 mod light;
 mod material;
 mod mesh;
+mod morph;
 mod node;
+mod skin;
 mod tangents;
 mod texture;
 mod used;
+mod variants;
 mod vertices;
 mod views;
 
@@ -32,6 +37,7 @@ use crate::materials::MaterialDesc;
 use crate::scene::{Scene, SceneBuilder, ScenePlugins};
 use accessor::Source;
 pub use environment::{EnvironmentOption, EnvironmentSource};
+use hierarchy::Hierarchy;
 use image::Images;
 use json::Cursor;
 use node::Walker;
@@ -43,6 +49,12 @@ pub struct ImportOptions {
     pub light_units: LightUnits,
     /// Name of the scene; `None` for the file's default.
     pub scene: Option<String>,
+    /// The moment at which animations are shown, in seconds; `None` for the rest pose.
+    pub time: Option<f64>,
+    /// Name of the one animation that is shown; `None` for all.
+    pub animation: Option<String>,
+    /// Name of the variant of the materials; `None` for the file's default.
+    pub variant: Option<String>,
     /// Light from all around, instead of the file's own.
     pub environment: Option<EnvironmentOption>,
 }
@@ -62,8 +74,10 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
     "EXT_texture_webp",
     #[cfg(feature = "ktx2")]
@@ -231,9 +245,12 @@ fn fill<'a>(
     builder: &mut SceneBuilder,
     notes: &mut Notes,
 ) -> Result<(), Failure> {
-    if root.get("animations").is_some() {
-        notes.add("animations are not supported yet: the rest pose is used", 1);
+    let animations = root.items("animations")?.len();
+    if animations > 0 && options.time.is_none() {
+        builder.inform("animations are at rest; --time or --frame shows them at a moment");
     }
+    let pose = animation::pose(source, options, notes)?;
+    let variant = variants::choose(root, options.variant.as_deref())?;
     let roots = roots(root, options)?;
     let used = used::materials(root, &roots)?;
     let entries = root.items("materials")?;
@@ -269,6 +286,8 @@ fn fill<'a>(
     let mut walker = Walker {
         source,
         light_units,
+        variant,
+        hierarchy: Hierarchy::new(root.clone(), &pose),
         materials: &materials,
         default_material,
         builder,

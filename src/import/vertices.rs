@@ -15,6 +15,9 @@ pub(super) struct Vertices {
     pub(super) radii: Vec<[f32; 1]>,
 }
 
+/// Where joints stand in the file, and for each vertex four of them with their weights.
+type Influences<'a> = (Cursor<'a>, Vec<[u32; 4]>, Vec<[f32; 4]>);
+
 /// Most sets of one kind of attribute.
 pub(super) const MAX_SETS: usize = 16;
 
@@ -111,6 +114,35 @@ impl<'a> Attributes<'_, 'a> {
             *c = c.clamp(0.0, 1.0);
         }
         Ok(colors)
+    }
+
+    /// How a morph target changes colours: any numbers, alpha zero where it is not given.
+    pub(super) fn color_offsets(&self, name: &str) -> Result<Vec<[f32; 4]>, Problem> {
+        match self.accessor(name)? {
+            None => Ok(Vec::new()),
+            Some(a) if a.width == 3 => {
+                let rgb = self.finite::<3>(&a)?;
+                Ok(rgb.into_iter().map(|[r, g, b]| [r, g, b, 0.0]).collect())
+            }
+            Some(a) => self.finite::<4>(&a),
+        }
+    }
+
+    /// One set of joints and weights, with where the joints stand in the file.
+    pub(super) fn influences(&self, set: usize) -> Result<Option<Influences<'a>>, Problem> {
+        let (joints, weights) = (format!("JOINTS_{set}"), format!("WEIGHTS_{set}"));
+        let Some(accessor) = self.accessor(&joints)? else {
+            return Ok(None);
+        };
+        let from = accessor.from.clone();
+        let joints = self.source.whole::<4>(&accessor, self.pick.as_deref())?;
+        let Some(mut accessor) = self.accessor(&weights)? else {
+            return Err(from.problem(format!("has no {weights} beside it")));
+        };
+        // As for colours, nothing else is allowed of integers.
+        accessor.normalized = true;
+        let weights = self.finite::<4>(&accessor)?;
+        Ok(Some((from, joints, weights)))
     }
 
     fn uv_sets(&self) -> Result<Vec<Vec<[f32; 2]>>, Problem> {
