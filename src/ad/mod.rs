@@ -4,8 +4,10 @@
 //! carries derivatives. Branches are taken on the primal value ([`Real::re`]); a derivative is
 //! that of the branch taken.
 
+mod dual;
 mod real;
 mod vec3;
 
+pub use dual::Dual;
 pub use real::Real;
 pub use vec3::V3;

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::Real;
+use super::{Dual, Real};
 use crate::math::DVec3;
 
 /// A three-vector of scalars.
@@ -47,6 +47,33 @@ impl<R: Real> V3<R> {
             y: self.z * o.x - self.x * o.z,
             z: self.x * o.y - self.y * o.x,
         }
+    }
+}
+
+impl<const N: usize> V3<Dual<f64, N>> {
+    /// The vector `v` whose derivative by input `k` is `d[k]`.
+    #[inline]
+    pub fn with_derivatives(v: DVec3, d: [DVec3; N]) -> Self {
+        Self {
+            x: Dual::new(v.x, d.map(|d| d.x)),
+            y: Dual::new(v.y, d.map(|d| d.y)),
+            z: Dual::new(v.z, d.map(|d| d.z)),
+        }
+    }
+
+    /// The derivatives by each input; `None` where they do not exist.
+    #[inline]
+    pub fn derivatives(self) -> Option<[DVec3; N]> {
+        let (x, y, z) = (self.x.gradient()?, self.y.gradient()?, self.z.gradient()?);
+        Some(std::array::from_fn(|k| DVec3::new(x[k], y[k], z[k])))
+    }
+}
+
+impl V3<Dual<f64, 3>> {
+    /// The vector `v` as three inputs: its own derivative is the unit matrix.
+    #[inline]
+    pub fn variable(v: DVec3) -> Self {
+        Self::with_derivatives(v, DVec3::AXES)
     }
 }
 

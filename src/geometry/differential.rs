@@ -8,11 +8,9 @@
 //! Source: Igehy, *Tracing Ray Differentials*, 1999; Suykens and Willems, *Path Differentials and
 //! Applications*, 2001 (what to do at other surfaces than mirrors).
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
-
 use super::object::Placement;
 use super::{Footprint, Geometry, Ray, Shape, SurfacePoint, sphere, triangle};
-use crate::ad::{Real, V3};
+use crate::ad::{Dual, Real, V3};
 use crate::math::{DAffine3, DMat3, DVec3, Frame, Vec3};
 
 // The functions of this file are kept out of line: most scenes have no texture, and then the
@@ -50,8 +48,8 @@ impl Differential {
     #[inline(never)]
     pub fn land(&self, geometry: &Geometry, ray: &Ray, sp: &SurfacePoint) -> Option<Landing> {
         let object = geometry.object(sp.object);
-        let o = pair(ray.origin(), self.origin);
-        let d = pair(-sp.wo, self.direction);
+        let o = V3::with_derivatives(ray.origin(), self.origin);
+        let d = V3::with_derivatives(-sp.wo, self.direction);
         let (p, n) = meet(
             o,
             d,
@@ -59,13 +57,11 @@ impl Differential {
             object.placement.as_ref(),
             sp,
         )?;
-        let landing = Landing {
-            point: derivatives(p),
-            normal: derivatives(n),
+        Some(Landing {
+            point: p.derivatives()?,
+            normal: n.derivatives()?,
             direction: self.direction,
-        };
-        let finite = |v: &[DVec3; 2]| v.iter().all(|v| v.is_finite());
-        (finite(&landing.point) && finite(&landing.normal)).then_some(landing)
+        })
     }
 }
 
@@ -83,30 +79,28 @@ impl Landing {
     /// reflection or refraction. Its index of refraction is read off the two directions.
     #[inline(never)]
     pub fn follow(&self, sp: &SurfacePoint, wi: DVec3) -> Differential {
-        let d = pair(-sp.wo, self.direction);
+        let d = V3::with_derivatives(-sp.wo, self.direction);
         let (cos_o, cos_i) = (sp.wo.dot(sp.n), wi.dot(sp.n));
         let out = if cos_o * cos_i > 0.0 {
             // The normal that was reflected at, which a normal map may have turned.
             let h = (sp.wo + wi).try_normalize().unwrap_or(sp.n);
             let side = if h.dot(sp.n) < 0.0 { -1.0 } else { 1.0 };
-            Some(reflect(d, pair(h, self.normal.map(|v| v * side))))
+            Some(reflect(
+                d,
+                V3::with_derivatives(h, self.normal.map(|v| v * side)),
+            ))
         } else {
             let sin = |v: DVec3, cos: f64| (v - sp.n * cos).length();
             let (sin_o, sin_i) = (sin(sp.wo, cos_o), sin(wi, cos_i));
             // Straight down nothing tells the index; what bends there is second order.
             let eta = if sin_o > 1e-9 { sin_i / sin_o } else { 1.0 };
             let side = if cos_o < 0.0 { -1.0 } else { 1.0 };
-            let n = pair(sp.n * side, self.normal.map(|v| v * side));
-            refract(d, n, Pair::constant(eta.clamp(0.2, 5.0)))
+            let n = V3::with_derivatives(sp.n * side, self.normal.map(|v| v * side));
+            refract(d, n, Dual::constant(eta.clamp(0.2, 5.0)))
         };
-        let direction = out.map_or(self.direction, derivatives);
         Differential {
             origin: self.point,
-            direction: if direction.iter().all(|v| v.is_finite()) {
-                direction
-            } else {
-                self.direction
-            },
+            direction: out.and_then(V3::derivatives).unwrap_or(self.direction),
         }
     }
 
@@ -205,93 +199,4 @@ fn vector<R: Real>(m: &DMat3, v: V3<R>) -> V3<R> {
 
 fn point<R: Real>(m: &DAffine3, p: V3<R>) -> V3<R> {
     vector(&m.matrix3, p) + V3::constant(m.translation)
-}
-
-/// A number with its derivatives to the right and down.
-#[derive(Clone, Copy)]
-struct Pair {
-    re: f64,
-    d: [f64; 2],
-}
-
-impl Pair {
-    fn map(self, re: f64, slope: f64) -> Self {
-        Self {
-            re,
-            d: self.d.map(|d| d * slope),
-        }
-    }
-}
-
-impl Add for Pair {
-    type Output = Self;
-    #[inline]
-    fn add(self, o: Self) -> Self {
-        Self {
-            re: self.re + o.re,
-            d: [self.d[0] + o.d[0], self.d[1] + o.d[1]],
-        }
-    }
-}
-
-impl Sub for Pair {
-    type Output = Self;
-    #[inline]
-    fn sub(self, o: Self) -> Self {
-        self + -o
-    }
-}
-
-impl Neg for Pair {
-    type Output = Self;
-    #[inline]
-    fn neg(self) -> Self {
-        self.map(-self.re, -1.0)
-    }
-}
-
-impl Mul for Pair {
-    type Output = Self;
-    #[inline]
-    fn mul(self, o: Self) -> Self {
-        self.map(self.re * o.re, o.re) + o.map(0.0, self.re)
-    }
-}
-
-impl Div for Pair {
-    type Output = Self;
-    #[inline]
-    fn div(self, o: Self) -> Self {
-        let inv = 1.0 / o.re;
-        self * o.map(inv, -inv * inv)
-    }
-}
-
-impl Real for Pair {
-    #[inline]
-    fn constant(x: f64) -> Self {
-        Self { re: x, d: [0.0; 2] }
-    }
-    #[inline]
-    fn re(self) -> f64 {
-        self.re
-    }
-    #[inline]
-    fn sqrt(self) -> Self {
-        let root = self.re.sqrt();
-        self.map(root, 0.5 / root)
-    }
-}
-
-fn pair(v: DVec3, d: [DVec3; 2]) -> V3<Pair> {
-    let make = |re: f64, d: [f64; 2]| Pair { re, d };
-    V3 {
-        x: make(v.x, d.map(|d| d.x)),
-        y: make(v.y, d.map(|d| d.y)),
-        z: make(v.z, d.map(|d| d.z)),
-    }
-}
-
-fn derivatives(v: V3<Pair>) -> [DVec3; 2] {
-    [0, 1].map(|k| DVec3::new(v.x.d[k], v.y.d[k], v.z.d[k]))
 }

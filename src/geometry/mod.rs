@@ -6,9 +6,11 @@
 
 mod coverage;
 mod differential;
+pub mod forecast;
 mod hit;
 mod mesh;
 mod object;
+mod patch;
 mod ray;
 pub mod sphere;
 mod surface;
@@ -20,6 +22,7 @@ pub use differential::{Differential, Landing};
 pub use hit::Hit;
 pub use mesh::{Invalid, TriangleMesh};
 pub use object::{Geometry, Object, Placement, Shape, SphereSet};
+pub use patch::{Edge, Patches, Walk};
 pub use ray::Ray;
 pub use surface::{Footprint, Surface};
 pub use surface_point::{LightId, MaterialId, ObjectId, ShapeId, SurfacePoint};

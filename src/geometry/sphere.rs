@@ -6,6 +6,10 @@
 use crate::ad::{Real, V3};
 use crate::math::DVec3;
 
+/// Discriminant below which a line counts as tangent: the derivative of the distance grows as its
+/// inverse root, and that of the normal with it.
+const TANGENT: f64 = 1e-6;
+
 /// How a line passes a sphere.
 #[derive(Clone, Copy, Debug)]
 pub struct LineSphere<R> {
@@ -59,7 +63,10 @@ impl<R: Real> LineSphere<R> {
         if !(self.discriminant.re() >= 0.0) {
             return None;
         }
-        let root = (self.discriminant * self.dd).sqrt() * R::constant(self.r);
+        let mut root = (self.discriminant * self.dd).sqrt() * R::constant(self.r);
+        if self.discriminant.re() < TANGENT {
+            root = root.branch_point();
+        }
         // The sum of equal signs is free of cancellation; the other root follows from c / q.
         let q = if self.b.re() >= 0.0 {
             self.b + root

@@ -3,6 +3,9 @@
 use crate::ad::{Real, V3};
 use crate::math::DVec3;
 
+/// Cosine below which derivatives of the point hit say nothing: they have a pole at zero.
+const GRAZING: f64 = 1e-6;
+
 /// Where a line meets the plane of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaneHit<R> {
@@ -34,7 +37,10 @@ pub fn plane_hit<R: Real>(
     if det.re() == 0.0 || !det.re().is_finite() {
         return None;
     }
-    let inv = R::constant(1.0) / det;
+    let mut inv = R::constant(1.0) / det;
+    if det.re() * det.re() < GRAZING * GRAZING * d.re().length_squared() * n.re().length_squared() {
+        inv = inv.branch_point();
+    }
     let s = o - V3::constant(v0);
     let m = s.cross(d) * inv;
     Some(PlaneHit {
