@@ -25,7 +25,7 @@ use dualight::sampling::Rng;
 #[allow(dead_code, unreachable_pub, reason = "shared with the tests")]
 mod oracle;
 
-use oracle::Oracle;
+use oracle::{Checked, Oracle};
 
 type Input = (DVec3, DVec3);
 
@@ -58,6 +58,10 @@ fn race(repeats: usize, inputs: &[Input], fs: &[(&str, &dyn Fn(&Input) -> f64)])
 
 fn gradient_sum(d: Dual<f64, 3>) -> f64 {
     d.gradient().map_or(0.0, |g| g[0] + g[1] + g[2])
+}
+
+fn checked_sum(c: Checked) -> f64 {
+    c.gradient().map_or(0.0, |g| g.iter().sum())
 }
 
 fn sphere<R: Real>(d: V3<R>, o: DVec3, sum: impl Fn(R) -> f64) -> f64 {
@@ -97,6 +101,9 @@ fn main() {
             ("num_dual::DualSVec64<3>", &|i| {
                 sphere(Oracle::inputs(i.1), i.0, |r| r.gradient().iter().sum())
             }),
+            ("the same with an invalid state", &|i| {
+                sphere(Checked::inputs(i.1), i.0, checked_sum)
+            }),
         ],
     );
     println!("triangle: distance and barycentrics with three derivatives");
@@ -113,12 +120,15 @@ fn main() {
             ("num_dual::DualSVec64<3>", &|i| {
                 triangle(Oracle::inputs(i.1), i.0, v, |r| r.gradient().iter().sum())
             }),
+            ("the same with an invalid state", &|i| {
+                triangle(Checked::inputs(i.1), i.0, v, checked_sum)
+            }),
         ],
     );
     println!(
-        "the library takes {:.2} times as long on the sphere, {:.2} on the triangle",
-        s[2] / s[1],
-        t[2] / t[1]
+        "the library with an invalid state takes {:.2} times as long on the sphere, {:.2} on the triangle",
+        s[3] / s[1],
+        t[3] / t[1]
     );
 
     println!("a check of four corners: forecast against tracing");

@@ -124,14 +124,17 @@ fn intersections_on_duals_agree_with_the_library_and_keep_the_plain_value() {
             ];
             let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
             let n = e1.cross(e2);
-            if (d.dot(n) / (d.length() * n.length())).abs() < 1e-3 {
+            // Both round; at grazing incidence and on slivers what they round is amplified.
+            let thin = n.length() / (e1.length() * e2.length());
+            if (d.dot(n) / (d.length() * n.length())).abs() < 1e-2 || thin < 1e-2 {
                 continue;
             }
             let a = plane_hit(mo, md, v[0], e1, e2, n).expect("not parallel");
             let b = plane_hit(lo, ld, v[0], e1, e2, n).expect("not parallel");
             for (x, y) in [(a.t, b.t), (a.b1, b.b1), (a.b2, b.b2)] {
                 let (g, l) = (x.gradient().unwrap(), y.gradient());
-                let size = l.iter().map(|x| x.abs()).fold(0.0, f64::max);
+                // Terms of order one may cancel.
+                let size = l.iter().map(|x| x.abs()).fold(1.0, f64::max);
                 for j in 0..3 {
                     assert!(close(g[j], l[j], size, 1e-11), "{g:?} {l:?}");
                 }

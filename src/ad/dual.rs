@@ -8,6 +8,18 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::Real;
 
+/// What is known of the derivatives; of two operands the later one counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum State {
+    /// They are zero. Most operands of an intersection are constants (a centre, a corner, the
+    /// light's position); the compiler sees it, and half of the work goes.
+    Constant,
+    /// They exist.
+    Varies,
+    /// They do not.
+    Invalid,
+}
+
 /// A value with its partial derivatives by `N` inputs.
 ///
 /// Values are computed by the same operations, in the same order, as on the plain scalar, so every
@@ -16,136 +28,167 @@ use super::Real;
 /// on, [`gradient`](Self::gradient) of everything computed from it is `None`. A NaN instead would
 /// make comparisons quietly false.
 ///
+/// Everything is inlined by force: only then does the compiler see which operands are constants,
+/// and without that an intersection takes twice as long.
+///
 /// `T` may be a dual number again; the derivatives then have derivatives of their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dual<T, const N: usize> {
     re: T,
     eps: [T; N],
-    valid: bool,
+    state: State,
 }
 
 impl<T: Real, const N: usize> Dual<T, N> {
     /// The value `re` with the given derivatives.
-    #[inline]
+    #[inline(always)]
     pub fn new(re: T, eps: [T; N]) -> Self {
         Self {
             re,
             eps,
-            valid: true,
+            state: State::Varies,
         }
     }
 
     /// Input number `i`, whose derivative by itself is one.
-    #[inline]
+    #[inline(always)]
     pub fn variable(re: T, i: usize) -> Self {
         Self::new(re, from_fn(|k| T::constant(f64::from(u8::from(k == i)))))
     }
 
     /// The value as the scalar it was computed in.
-    #[inline]
+    #[inline(always)]
     pub fn value(&self) -> T {
         self.re
     }
 
     /// The derivatives; `None` where they do not exist, or are too large for the scalar.
-    #[inline]
+    #[inline(always)]
     pub fn gradient(&self) -> Option<[T; N]> {
         let finite = self.eps.iter().all(|e| e.re().is_finite());
-        (self.valid && self.re.re().is_finite() && finite).then_some(self.eps)
+        let valid = self.state != State::Invalid;
+        (valid && self.re.re().is_finite() && finite).then_some(self.eps)
     }
 
     /// The linear forecast `f + ∇f·h` (the paper's equation 1).
-    #[inline]
+    #[inline(always)]
     pub fn forecast(&self, h: [T; N]) -> Option<T> {
         let g = self.gradient()?;
         Some((0..N).fold(self.re, |sum, k| sum + g[k] * h[k]))
     }
 
     /// `re` with derivatives made from those of `self` by the factor `slope`.
-    #[inline]
+    #[inline(always)]
     fn chain(self, re: T, slope: T) -> Self {
         Self {
             re,
-            eps: self.eps.map(|e| e * slope),
-            valid: self.valid,
+            eps: self.each(|e| e * slope),
+            state: self.state,
+        }
+    }
+
+    /// The derivatives, each by `f`; those of a constant are zero without any work.
+    #[inline(always)]
+    fn each(self, f: impl Fn(T) -> T) -> [T; N] {
+        match self.state {
+            State::Constant => self.eps,
+            _ => self.eps.map(f),
+        }
+    }
+
+    /// The derivatives of a function of two numbers with these partial derivatives.
+    #[inline(always)]
+    fn join(self, o: Self, re: T, by_self: T, by_o: T) -> Self {
+        match (self.state, o.state) {
+            (State::Constant, _) => o.chain(re, by_o),
+            (_, State::Constant) => self.chain(re, by_self),
+            (a, b) => Self {
+                re,
+                eps: from_fn(|k| self.eps[k] * by_self + o.eps[k] * by_o),
+                state: a.max(b),
+            },
         }
     }
 }
 
 impl<T: Real, const N: usize> Add for Dual<T, N> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Self {
-            re: self.re + o.re,
-            eps: from_fn(|k| self.eps[k] + o.eps[k]),
-            valid: self.valid & o.valid,
-        }
+        let (re, state) = (self.re + o.re, self.state.max(o.state));
+        let eps = match (self.state, o.state) {
+            (State::Constant, _) => o.eps,
+            (_, State::Constant) => self.eps,
+            _ => from_fn(|k| self.eps[k] + o.eps[k]),
+        };
+        Self { re, eps, state }
     }
 }
 
 impl<T: Real, const N: usize> Sub for Dual<T, N> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        Self {
-            re: self.re - o.re,
-            eps: from_fn(|k| self.eps[k] - o.eps[k]),
-            valid: self.valid & o.valid,
-        }
+        let (re, state) = (self.re - o.re, self.state.max(o.state));
+        let eps = match (self.state, o.state) {
+            (_, State::Constant) => self.eps,
+            (State::Constant, _) => o.each(|e| -e),
+            _ => from_fn(|k| self.eps[k] - o.eps[k]),
+        };
+        Self { re, eps, state }
     }
 }
 
 impl<T: Real, const N: usize> Mul for Dual<T, N> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        Self {
-            re: self.re * o.re,
-            eps: from_fn(|k| self.eps[k] * o.re + self.re * o.eps[k]),
-            valid: self.valid & o.valid,
-        }
+        self.join(o, self.re * o.re, o.re, self.re)
     }
 }
 
 impl<T: Real, const N: usize> Div for Dual<T, N> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn div(self, o: Self) -> Self {
-        let re = self.re / o.re;
-        let inv = T::constant(1.0) / o.re;
-        Self {
-            re,
-            eps: from_fn(|k| (self.eps[k] - re * o.eps[k]) * inv),
-            valid: self.valid & o.valid & (o.re.re() != 0.0),
+        let (re, inv) = (self.re / o.re, T::constant(1.0) / o.re);
+        let out = self.join(o, re, inv, -re * inv);
+        if o.re.re() == 0.0 {
+            out.branch_point()
+        } else {
+            out
         }
     }
 }
 
 impl<T: Real, const N: usize> Neg for Dual<T, N> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn neg(self) -> Self {
         Self {
             re: -self.re,
-            eps: self.eps.map(|e| -e),
-            valid: self.valid,
+            eps: self.each(|e| -e),
+            state: self.state,
         }
     }
 }
 
 impl<T: Real, const N: usize> Real for Dual<T, N> {
-    #[inline]
+    #[inline(always)]
     fn constant(x: f64) -> Self {
-        Self::new(T::constant(x), [T::constant(0.0); N])
+        Self {
+            re: T::constant(x),
+            eps: [T::constant(0.0); N],
+            state: State::Constant,
+        }
     }
 
-    #[inline]
+    #[inline(always)]
     fn re(self) -> f64 {
         self.re.re()
     }
 
-    #[inline]
+    #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.re.sqrt();
         let out = self.chain(root, T::constant(0.5) / root);
@@ -156,28 +199,28 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (s, c) = self.re.sin_cos();
         (self.chain(s, c), self.chain(c, -s))
     }
 
-    #[inline]
+    #[inline(always)]
     fn exp(self) -> Self {
         let e = self.re.exp();
         self.chain(e, e)
     }
 
-    #[inline]
+    #[inline(always)]
     fn scale(self, s: f64) -> Self {
         Self {
             re: self.re.scale(s),
-            eps: self.eps.map(|e| e.scale(s)),
-            valid: self.valid,
+            eps: self.each(|e| e.scale(s)),
+            state: self.state,
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn abs(self) -> Self {
         match self.re.re() {
             x if x < 0.0 => -self,
@@ -186,16 +229,15 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn branch_point(self) -> Self {
         Self {
-            re: self.re,
-            eps: [T::constant(0.0); N],
-            valid: false,
+            state: State::Invalid,
+            ..self
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn has_derivative(self) -> bool {
         self.gradient().is_some()
     }

@@ -18,7 +18,7 @@ pub struct V3<R> {
 
 impl<R: Real> V3<R> {
     /// A constant vector.
-    #[inline]
+    #[inline(always)]
     pub fn constant(v: DVec3) -> Self {
         Self {
             x: R::constant(v.x),
@@ -28,19 +28,19 @@ impl<R: Real> V3<R> {
     }
 
     /// The primal values.
-    #[inline]
+    #[inline(always)]
     pub fn re(self) -> DVec3 {
         DVec3::new(self.x.re(), self.y.re(), self.z.re())
     }
 
     /// Scalar product.
-    #[inline]
+    #[inline(always)]
     pub fn dot(self, o: Self) -> R {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
 
     /// Vector product.
-    #[inline]
+    #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         Self {
             x: self.y * o.z - self.z * o.y,
@@ -52,7 +52,7 @@ impl<R: Real> V3<R> {
 
 impl<const N: usize> V3<Dual<f64, N>> {
     /// The vector `v` whose derivative by input `k` is `d[k]`.
-    #[inline]
+    #[inline(always)]
     pub fn with_derivatives(v: DVec3, d: [DVec3; N]) -> Self {
         Self {
             x: Dual::new(v.x, d.map(|d| d.x)),
@@ -62,7 +62,7 @@ impl<const N: usize> V3<Dual<f64, N>> {
     }
 
     /// The derivatives by each input; `None` where they do not exist.
-    #[inline]
+    #[inline(always)]
     pub fn derivatives(self) -> Option<[DVec3; N]> {
         let (x, y, z) = (self.x.gradient()?, self.y.gradient()?, self.z.gradient()?);
         Some(std::array::from_fn(|k| DVec3::new(x[k], y[k], z[k])))
@@ -71,7 +71,7 @@ impl<const N: usize> V3<Dual<f64, N>> {
 
 impl V3<Dual<f64, 3>> {
     /// The vector `v` as three inputs: its own derivative is the unit matrix.
-    #[inline]
+    #[inline(always)]
     pub fn variable(v: DVec3) -> Self {
         Self::with_derivatives(v, DVec3::AXES)
     }
@@ -79,7 +79,7 @@ impl V3<Dual<f64, 3>> {
 
 impl<R: Real> Add for V3<R> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn add(self, o: Self) -> Self {
         Self {
             x: self.x + o.x,
@@ -91,7 +91,7 @@ impl<R: Real> Add for V3<R> {
 
 impl<R: Real> Sub for V3<R> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn sub(self, o: Self) -> Self {
         Self {
             x: self.x - o.x,
@@ -103,7 +103,7 @@ impl<R: Real> Sub for V3<R> {
 
 impl<R: Real> Mul<R> for V3<R> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn mul(self, s: R) -> Self {
         Self {
             x: self.x * s,
@@ -115,7 +115,7 @@ impl<R: Real> Mul<R> for V3<R> {
 
 impl<R: Real> Neg for V3<R> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn neg(self) -> Self {
         Self {
             x: -self.x,
