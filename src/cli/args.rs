@@ -97,7 +97,7 @@ pub struct SceneArgs {
     #[arg(allow_negative_numbers = true)]
     pub frame: Option<f64>,
     /// Frames in a second [default: 24, as Blender's]
-    #[arg(long, value_name = "FPS", value_parser = values::rate, requires = "frame")]
+    #[arg(long, value_name = "FPS", value_parser = values::rate, requires = "frame", conflicts_with = "time")]
     pub fps: Option<f64>,
     /// Show one animation alone; needs --time or --frame [default: all of them]
     #[arg(long, value_name = "NAME", requires = "moment")]
@@ -215,6 +215,9 @@ pub struct InspectArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as the help of the command")]
     pub scene: SceneArgs,
+    /// Print what is found as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Options of `dualight diff`.

@@ -202,6 +202,26 @@ fn decode_ktx2(
     file.decode().map(Some).or_else(tell)
 }
 
+/// The format of an image file and its columns and rows, as far as its header tells.
+pub(super) fn header(bytes: &[u8]) -> (&'static str, Option<[u32; 2]>) {
+    #[cfg(feature = "ktx2")]
+    if ktx2::recognises(bytes) {
+        let file = ktx2::Ktx2::open(bytes).ok();
+        return ("ktx2", file.map(|f| [f.width, f.height]));
+    }
+    let Ok(format) = image::guess_format(bytes) else {
+        let container = if is_container(bytes) {
+            "texture container"
+        } else {
+            "unknown"
+        };
+        return (container, None);
+    };
+    let name = format.extensions_str().first().copied();
+    let size = ImageReader::with_format(io::Cursor::new(bytes), format).into_dimensions();
+    (name.unwrap_or("unknown"), size.ok().map(|(w, h)| [w, h]))
+}
+
 /// Whether the bytes begin as a texture container does that is known by name: KTX, KTX2, Basis.
 fn is_container(bytes: &[u8]) -> bool {
     [&b"\xABKTX 11\xBB"[..], b"\xABKTX 20\xBB", b"sB\x13\x00"]

@@ -12,6 +12,7 @@ mod container;
 mod environment;
 mod hierarchy;
 mod image;
+mod inventory;
 mod json;
 #[cfg(feature = "ktx2")]
 mod ktx2;
@@ -39,6 +40,7 @@ use accessor::Source;
 pub use environment::{EnvironmentOption, EnvironmentSource};
 use hierarchy::Hierarchy;
 use image::Images;
+pub use inventory::{AnimationInfo, Extensions, ImageInfo, Inventory, MaterialInfo, inventory};
 use json::Cursor;
 use node::Walker;
 
