@@ -196,3 +196,132 @@ fn a_glb_is_read_as_its_text_is() {
         assert_eq!(e.exit_code(), code);
     }
 }
+
+#[test]
+fn instances_share_one_shape() {
+    let mut a = Asset::triangle();
+    let t = a.floats("VEC3", &[0., 0., 0., 5., 0., 0., 0., 5., 0.]);
+    let r = a.packed("VEC4", 5122, &[0, 0, 0, 0, 0, 0, 255, 127].repeat(3), 3);
+    let s = a.floats("VEC3", &[1., 1., 1., 2., 2., 2., 1., 1., -1.]);
+    a.json["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {
+        "attributes": {"TRANSLATION": t, "ROTATION": r, "SCALE": s}}});
+    a.json["nodes"][0]["translation"] = json!([0., 0., 1.]);
+    a.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+    let scene = a.read().unwrap();
+    assert_eq!(scene.geometry.shapes.len(), 1);
+    let placed: Vec<_> = scene
+        .geometry
+        .objects
+        .iter()
+        .map(|o| o.placement.unwrap())
+        .collect();
+    assert_eq!(placed.len(), 3);
+    let to = |i: usize| placed[i].world_from_object.translation.to_array();
+    assert_eq!(
+        [to(0), to(1), to(2)],
+        [[0., 0., 1.], [5., 0., 1.], [0., 5., 1.]]
+    );
+    assert!((placed[1].world_from_object.matrix3.determinant() - 8.0).abs() < 1e-6);
+    // Lengths that differ, and none at all.
+    let e = |a: &mut Asset, v| {
+        a.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = v;
+        a.error()
+    };
+    let short = a.floats("VEC3", &[0., 0., 0.]);
+    let text = e(&mut a, json!({"TRANSLATION": t, "SCALE": short}));
+    assert!(
+        text.contains("different lengths") && text.contains("/nodes/0/extensions"),
+        "{text}"
+    );
+    assert!(e(&mut a, json!({})).contains("no TRANSLATION"));
+}
+
+#[test]
+fn equal_primitives_are_one_shape() {
+    let mut a = Asset::triangle();
+    let p = a.json["meshes"][0]["primitives"][0].clone();
+    a.json["meshes"] = json!([{"primitives": [p.clone(), p.clone()]}, {"primitives": [p]}]);
+    a.json["nodes"] = json!([{"mesh": 0, "children": [1]}, {"mesh": 1, "translation": [1, 0, 0]}]);
+    let scene = a.read().unwrap();
+    assert_eq!(
+        (scene.geometry.shapes.len(), scene.geometry.objects.len()),
+        (1, 3)
+    );
+}
+
+#[test]
+fn implicit_shapes_are_spheres() {
+    let mut a = Asset::triangle();
+    a.json["extensions"] = json!({"KHR_implicit_shapes": {"shapes": [
+        {"type": "sphere", "sphere": {"radius": 2.0}}, {"type": "sphere"},
+        {"type": "box", "box": {}}]}});
+    a.json["extensionsRequired"] = json!(["KHR_implicit_shapes"]);
+    let shape = |i: usize| json!({"KHR_implicit_shapes": {"shape": i}});
+    // As a primitive, and as a node with and without a mesh.
+    a.json["meshes"][0]["primitives"][0] = json!({"attributes": {}, "extensions": shape(0)});
+    let scene = a.read().unwrap();
+    assert_eq!(spheres(&scene).spheres, [[0., 0., 0., 2.]]);
+    a.json["nodes"][0] = json!({"extensions": shape(1), "scale": [3.0, 3.0, 3.0]});
+    assert_eq!(spheres(&a.read().unwrap()).spheres, [[0., 0., 0., 1.5]]);
+    // Stretched, they stay analytic: an instance of a sphere.
+    a.json["nodes"][0]["scale"] = json!([3.0, 1.0, 1.0]);
+    let scene = a.read().unwrap();
+    assert_eq!(spheres(&scene).spheres, [[0., 0., 0., 0.5]]);
+    assert!(scene.geometry.objects[0].placement.is_some());
+    a.json["nodes"][0]["extensions"] = shape(2);
+    assert!(a.error().contains("holds no"));
+    a.json["nodes"][0]["extensions"] = shape(9);
+    assert!(
+        a.error()
+            .contains("/nodes/0/extensions/KHR_implicit_shapes/shape")
+    );
+}
+
+/// A ray through each accelerator against the ellipsoid's own equation.
+#[test]
+fn ellipsoids_are_hit_where_they_are() {
+    use dualight::accel::ACCELERATORS;
+    use dualight::geometry::Ray;
+    use dualight::math::DVec3;
+    let mut a = Asset::triangle();
+    let axes = DVec3::new(3.0, 1.0, 0.5);
+    a.json["nodes"][0] = json!({
+        "extras": {"sphere_radius": 1.0}, "scale": axes.to_array(), "translation": [1., 2., 3.]});
+    let scene = a.read().unwrap();
+    for entry in ACCELERATORS {
+        let accel = (entry.build)(&scene.geometry, 1).unwrap();
+        for i in 0..400 {
+            let t = f64::from(i);
+            let to = DVec3::new(
+                (t * 0.7).cos() * 3.2,
+                (t * 1.3).sin() * 1.1,
+                (t * 2.1).sin() * 0.5,
+            );
+            let from = DVec3::new(4.0 * t.sin(), 5.0, 4.0 * t.cos());
+            let ray = Ray::new(from + 1.0, to - from);
+            // |(o + t d) / axes| = 1 about the centre.
+            let (o, d) = (
+                (ray.origin() - DVec3::new(1., 2., 3.)) / axes,
+                ray.direction() / axes,
+            );
+            let (qa, qb, qc) = (d.dot(d), o.dot(d), o.dot(o) - 1.0);
+            let disc = qb * qb - qa * qc;
+            if disc.abs() < 1e-3 {
+                continue;
+            }
+            let hit = accel.intersect(&ray);
+            assert_eq!(hit.is_some(), disc > 0.0, "{}: ray {i}", entry.name);
+            if let Some(hit) = hit {
+                let sp = scene.surface_point(&ray, &hit);
+                let expected = (-qb - disc.sqrt()) / qa * ray.direction().length();
+                assert!(
+                    (sp.distance - expected).abs() < 1e-6 * expected,
+                    "{}",
+                    entry.name
+                );
+                let n = ((sp.p - DVec3::new(1., 2., 3.)) / (axes * axes)).normalize();
+                assert!((sp.ng - n).length() < 1e-6, "{}: {} {n}", entry.name, sp.ng);
+            }
+        }
+    }
+}

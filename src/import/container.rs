@@ -128,7 +128,10 @@ fn check_version(root: &Cursor<'_>) -> Result<(), Problem> {
     let version = root.need("asset")?.need("version")?;
     let text = version.str()?;
     let major = text.split('.').next().and_then(|m| m.parse::<u32>().ok());
-    if major != Some(2) {
+    let Some(major) = major else {
+        return Err(version.problem(format!("'{text}' is no version of glTF")));
+    };
+    if major != 2 {
         return Err(Problem::unsupported(
             version.path(),
             format!("glTF {text} is not glTF 2"),

@@ -1,10 +1,12 @@
 //! Meshes: the primitives that make surfaces.
 
+use std::sync::Arc;
+
 use super::accessor::Source;
 use super::json::Cursor;
 use super::skin::Skin;
 use super::vertices::{Attributes, Vertices};
-use super::{Notes, Problem, morph};
+use super::{Notes, Problem, implicit, morph};
 use crate::geometry::{SphereSet, TriangleMesh};
 
 /// What a primitive is made of.
@@ -31,7 +33,10 @@ pub(super) fn read<'a>(
     shaping: Shaping<'_>,
     notes: &mut Notes,
 ) -> Result<Option<Part>, Problem> {
-    let mode = p.index_or("mode", 4)?;
+    if let Some(set) = implicit::shape(p, &source.root, notes)? {
+        return Ok(Some(Part::Spheres(set)));
+    }
+    let mut mode = p.index_or("mode", 4)?;
     let map = p.need("attributes")?;
     let Some(position) = map.get("POSITION") else {
         notes.add("primitives without positions are left out", 1);
@@ -55,8 +60,17 @@ pub(super) fn read<'a>(
         source,
         map,
         pick: None,
+        #[cfg(feature = "draco")]
+        draco: None,
     };
-    let order = order(p, &mut attributes, &position)?;
+    let order = match p.extension(DRACO) {
+        Some(e) => {
+            // Strips come out as lists.
+            mode = 4;
+            Some(compressed(p, &e, &mut attributes)?)
+        }
+        None => order(p, &mut attributes, &position)?,
+    };
     let mut vertices = attributes.vertices()?;
     morph::apply(p, &attributes, shaping.weights, &mut vertices)?;
     let mirrored = match shaping.skin {
@@ -80,6 +94,39 @@ pub(super) fn read<'a>(
         colors: vertices.colors,
         tangents: vertices.tangents,
     })))
+}
+
+/// The extension that compresses primitives.
+pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// Decodes a compressed primitive and gives its triangles.
+#[cfg(feature = "draco")]
+fn compressed<'a>(
+    p: &Cursor<'a>,
+    e: &Cursor<'a>,
+    attributes: &mut Attributes<'_, 'a>,
+) -> Result<Vec<u32>, Problem> {
+    let indices = match p.get("indices") {
+        Some(at) => attributes.source.accessor(&at)?.count,
+        None => attributes.count,
+    };
+    let draco = super::draco::Draco::decode(e, attributes.source, attributes.count, indices)?;
+    let order = draco.indices()?;
+    attributes.draco = Some(Arc::new(draco));
+    Ok(order)
+}
+
+#[cfg(not(feature = "draco"))]
+fn compressed<'a>(
+    _: &Cursor<'a>,
+    e: &Cursor<'a>,
+    _: &mut Attributes<'_, 'a>,
+) -> Result<Vec<u32>, Problem> {
+    Err(Problem::unsupported(
+        e.path(),
+        "is compressed, which this build cannot read",
+        "build with the feature `draco`, or export without compression",
+    ))
 }
 
 /// The indices of a primitive, if it has any. Where they name fewer vertices than there are, as
@@ -108,7 +155,7 @@ fn order<'a>(
             for i in &mut order {
                 *i = used.binary_search(i).unwrap_or_default() as u32;
             }
-            attributes.pick = Some(used);
+            attributes.pick = Some(Arc::new(used));
         }
     }
     Ok(Some(order))

@@ -9,9 +9,13 @@ mod animation;
 mod buffer;
 mod camera;
 mod container;
+#[cfg(feature = "draco")]
+mod draco;
 mod environment;
 mod hierarchy;
 mod image;
+mod implicit;
+mod instancing;
 mod inventory;
 mod json;
 #[cfg(feature = "ktx2")]
@@ -19,6 +23,8 @@ mod ktx2;
 mod light;
 mod material;
 mod mesh;
+#[cfg(feature = "meshopt")]
+mod meshopt;
 mod morph;
 mod node;
 mod skin;
@@ -29,7 +35,7 @@ mod variants;
 mod vertices;
 mod views;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 pub use crate::color::units::LightUnits;
@@ -80,6 +86,14 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_node_visibility",
+    "KHR_implicit_shapes",
+    "EXT_mesh_gpu_instancing",
+    #[cfg(feature = "draco")]
+    "KHR_draco_mesh_compression",
+    #[cfg(feature = "meshopt")]
+    "EXT_meshopt_compression",
+    #[cfg(feature = "meshopt")]
+    "KHR_meshopt_compression",
     "KHR_texture_transform",
     "EXT_texture_webp",
     #[cfg(feature = "ktx2")]
@@ -87,7 +101,7 @@ const SUPPORTED: &[&str] = &[
 ];
 
 /// Something is wrong at a place in the file.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Problem {
     place: String,
     problem: String,
@@ -166,6 +180,12 @@ struct Notes(BTreeMap<String, usize>);
 impl Notes {
     fn add(&mut self, what: impl Into<String>, n: usize) {
         *self.0.entry(what.into()).or_default() += n;
+    }
+
+    fn join(&mut self, other: Self) {
+        for (what, n) in other.0 {
+            self.add(what, n);
+        }
     }
 }
 
@@ -294,7 +314,6 @@ fn fill<'a>(
         default_material,
         builder,
         notes,
-        meshes: HashMap::new(),
     };
     walker.walk(&roots)?;
     Ok(())

@@ -44,12 +44,7 @@ pub(super) fn apply<'a>(
         if weight == 0.0 {
             continue;
         }
-        let target = Attributes {
-            source: base.source,
-            map: target,
-            count: base.count,
-            pick: base.pick.clone(),
-        };
+        let target = base.target(target);
         let weight = weight as f32;
         add(&mut v.positions, &target.floats::<3>("POSITION")?, weight);
         add(&mut v.normals, &target.floats::<3>("NORMAL")?, weight);

@@ -1,15 +1,17 @@
-//! Nodes: where things stand.
+//! Nodes: lights, cameras and meshes where they stand. Meshes are read in parallel, each once.
 
 use std::collections::HashMap;
+
+use rayon::prelude::*;
 
 use super::accessor::Source;
 use super::hierarchy::Hierarchy;
 use super::json::Cursor;
-use super::mesh::Part;
+use super::mesh::{Part, Shaping};
 use super::skin::Skin;
-use super::{Notes, Problem, camera, light, mesh, morph, tangents, variants};
+use super::{Notes, Problem, camera, implicit, instancing, light, mesh, morph, tangents, variants};
 use crate::color::units::LightUnits;
-use crate::geometry::{MaterialId, ShapeId, SphereSet, TriangleMesh};
+use crate::geometry::{MaterialId, ShapeId};
 use crate::math::DAffine3;
 use crate::scene::{MeshPlacement, SceneBuilder};
 
@@ -25,13 +27,7 @@ pub(super) struct Walker<'a, 'b> {
     pub(super) default_material: MaterialId,
     pub(super) builder: &'b mut SceneBuilder,
     pub(super) notes: &'b mut Notes,
-    /// Shapes of a mesh that was met before, with their materials, by mesh and the weights of
-    /// its morph targets.
-    pub(super) meshes: HashMap<(usize, Vec<u64>), Parts>,
 }
-
-/// The shapes of a mesh with their materials.
-type Parts = Vec<(ShapeId, MaterialId)>;
 
 /// What a node hands down.
 #[derive(Clone, Copy)]
@@ -40,11 +36,51 @@ struct Inherited {
     visible: bool,
 }
 
+/// What tells apart the shapes that one mesh can take: its index, its skin, its weights.
+type MeshKey = (usize, Option<usize>, Vec<u64>);
+
+/// A mesh in its pose.
+struct Posed<'a> {
+    mesh: Cursor<'a>,
+    weights: Vec<f64>,
+    skin: Option<Skin>,
+    /// Indices of its primitives among the jobs, with their materials.
+    parts: Vec<(usize, MaterialId)>,
+}
+
+/// A mesh that is to be placed.
+struct Use {
+    name: String,
+    /// Which of the posed meshes.
+    posed: usize,
+    worlds: Vec<DAffine3>,
+    /// The node is a sphere, whatever its mesh is.
+    sphere: Option<ShapeId>,
+}
+
+/// A primitive to be read.
+struct Job<'a> {
+    primitive: Cursor<'a>,
+    posed: usize,
+    /// Texture coordinates along which tangents are wanted.
+    tangents: Option<usize>,
+    name: String,
+}
+
+/// Meshes that were met on the way.
+#[derive(Default)]
+struct Met<'a> {
+    uses: Vec<Use>,
+    posed: Vec<Posed<'a>>,
+    known: HashMap<MeshKey, usize>,
+}
+
 impl<'a> Walker<'a, '_> {
-    /// Visits a node and everything below it. A tree can be deep, so this does not recurse; a
-    /// node that is met twice is a cycle or a shared child, which glTF forbids.
+    /// Visits the nodes below `roots`. A tree can be deep, so this does not recurse; a node that
+    /// is met twice is a cycle or a shared child, which glTF forbids.
     pub(super) fn walk(&mut self, roots: &[Cursor<'a>]) -> Result<(), Problem> {
         let mut seen = HashMap::new();
+        let mut met = Met::default();
         let top = Inherited {
             world: DAffine3::IDENTITY,
             visible: true,
@@ -61,70 +97,202 @@ impl<'a> Walker<'a, '_> {
                 world: parent.world * self.hierarchy.local(index, &node)?,
                 visible: parent.visible && is_visible(&node)?,
             };
-            self.visit(index, &node, own)?;
+            // Who cannot be seen can still see.
+            self.camera(&node, own.world)?;
+            if own.visible {
+                self.light(&node, own.world)?;
+                self.surface(index, &node, own.world, &mut met)?;
+            }
             for child in node.items("children")?.into_iter().rev() {
                 stack.push((child, own));
             }
         }
+        let jobs = self.jobs(&mut met.posed)?;
+        let shapes = self.read(&jobs, &met.posed)?;
+        for u in &met.uses {
+            self.place_all(u, &met.posed[u.posed], &shapes);
+        }
         Ok(())
     }
 
-    fn visit(&mut self, index: usize, node: &Cursor<'a>, own: Inherited) -> Result<(), Problem> {
-        let (name, world) = (node.name(), own.world);
-        // Who cannot be seen can still see.
+    /// Notes what surface a node carries.
+    fn surface(
+        &mut self,
+        index: usize,
+        node: &Cursor<'a>,
+        world: DAffine3,
+        met: &mut Met<'a>,
+    ) -> Result<(), Problem> {
+        let sphere = self.sphere(node)?;
+        let Some(at) = node.get("mesh") else {
+            if let Some(shape) = sphere {
+                self.place(shape, self.default_material, world, node.name());
+            }
+            return Ok(());
+        };
+        let posed = self.posed(index, node, &at, met)?;
+        let worlds = match node.extension("EXT_mesh_gpu_instancing") {
+            None => vec![world],
+            Some(e) => {
+                let own = instancing::read(&e, self.source)?;
+                own.into_iter().map(|w| world * w).collect()
+            }
+        };
+        met.uses.push(Use {
+            name: node.name(),
+            posed,
+            worlds,
+            sphere,
+        });
+        Ok(())
+    }
+
+    fn camera(&mut self, node: &Cursor<'a>, world: DAffine3) -> Result<(), Problem> {
         if let Some(at) = node.get("camera") {
             let camera = self.source.root.element("cameras", at.index()?, &at)?;
-            let desc = camera::read(&camera, name.clone(), world)?;
+            let desc = camera::read(&camera, node.name(), world)?;
             self.builder.add_camera(desc);
         }
-        if !own.visible {
-            return Ok(());
-        }
+        Ok(())
+    }
+
+    fn light(&mut self, node: &Cursor<'a>, world: DAffine3) -> Result<(), Problem> {
         if let Some(at) = node
             .extension("KHR_lights_punctual")
             .and_then(|e| e.get("light"))
         {
-            let desc = light::read(self, &at, name.clone(), world)?;
+            let desc = light::read(self, &at, node.name(), world)?;
             self.builder.add_light(desc);
         }
-        let Some(at) = node.get("mesh") else {
-            return Ok(());
-        };
-        let mesh = self.source.root.element("meshes", at.index()?, &at)?;
-        let posed = self.hierarchy.pose(index).and_then(|p| p.weights.as_ref());
-        let weights = morph::weights(posed, node, &mesh)?;
-        if let Some(at) = node.get("skin") {
-            let hierarchy = &mut self.hierarchy;
-            let skin = Skin::read(&at, self.source, |joint| hierarchy.world(joint))?;
-            let shaping = mesh::Shaping {
-                weights: &weights,
-                skin: Some(&skin),
-            };
-            // The node's own transform does not count (glTF 2.0, 3.7.3.3).
-            let world = DAffine3::from_translation(skin.center);
-            for (shape, material) in self.read(&mesh, shaping)? {
-                self.place(shape, material, world, name.clone());
-            }
-            return Ok(());
-        }
-        let parts = self.mesh(at.index()?, &mesh, &weights)?;
-        if let Some(radius) = node.get("extras").and_then(|e| e.get("sphere_radius")) {
-            let r = radius.f64()?;
-            if !(r > 0.0) {
-                return Err(radius.problem(format!("{r} is not a positive radius")));
-            }
-            let material = parts.first().map_or(self.default_material, |p| p.1);
-            let set = SphereSet {
-                spheres: vec![[0.0, 0.0, 0.0, r as f32]],
-            };
-            let shape = self.builder.add_spheres(set, &name);
-            self.place(shape, material, world, name);
-            return Ok(());
-        }
-        for (shape, material) in parts {
-            self.place(shape, material, world, name.clone());
-        }
         Ok(())
+    }
+
+    /// The sphere that a node is, if it says so.
+    fn sphere(&mut self, node: &Cursor<'a>) -> Result<Option<ShapeId>, Problem> {
+        let set = match implicit::by_extras(node)? {
+            Some(set) => Some(set),
+            None => implicit::shape(node, &self.source.root, self.notes)?,
+        };
+        Ok(set.map(|set| self.builder.add_spheres(set, &node.name())))
+    }
+
+    /// Which of the posed meshes a node has.
+    fn posed(
+        &mut self,
+        index: usize,
+        node: &Cursor<'a>,
+        at: &Cursor<'a>,
+        met: &mut Met<'a>,
+    ) -> Result<usize, Problem> {
+        let which = at.index()?;
+        let mesh = self.source.root.element("meshes", which, at)?;
+        let animated = self.hierarchy.pose(index).and_then(|p| p.weights.as_ref());
+        let weights = morph::weights(animated, node, &mesh)?;
+        let skin = node.get("skin");
+        let skinned = skin.as_ref().map(Cursor::index).transpose()?;
+        let bits = weights.iter().map(|w| w.to_bits()).collect();
+        if let Some(&known) = met.known.get(&(which, skinned, bits)) {
+            return Ok(known);
+        }
+        let bits = weights.iter().map(|w| w.to_bits()).collect();
+        met.known.insert((which, skinned, bits), met.posed.len());
+        let hierarchy = &mut self.hierarchy;
+        met.posed.push(Posed {
+            mesh,
+            weights,
+            skin: match skin {
+                Some(at) => Some(Skin::read(&at, self.source, |j| hierarchy.world(j))?),
+                None => None,
+            },
+            parts: Vec::new(),
+        });
+        Ok(met.posed.len() - 1)
+    }
+
+    /// Lists the primitives of all posed meshes, equal ones once.
+    fn jobs(&self, posed: &mut [Posed<'a>]) -> Result<Vec<Job<'a>>, Problem> {
+        let mut jobs: Vec<Job<'a>> = Vec::new();
+        let mut known: HashMap<String, usize> = HashMap::new();
+        for (i, m) in posed.iter_mut().enumerate() {
+            for p in m.mesh.items("primitives")? {
+                let at = variants::material(&p, self.variant)?;
+                let material = match &at {
+                    None => self.default_material,
+                    Some(m) => *self
+                        .materials
+                        .get(m.index()?)
+                        .ok_or_else(|| m.problem("names a material that does not exist"))?,
+                };
+                let tangents = match &at {
+                    None => None,
+                    Some(m) => {
+                        let m = self.source.root.element("materials", m.index()?, m)?;
+                        tangents::wanted(&m)?
+                    }
+                };
+                let pose = (m.skin.is_some() || !m.weights.is_empty()).then_some(i);
+                let key = format!("{pose:?} {tangents:?} {}", Content(&p));
+                let job = *known.entry(key).or_insert_with(|| {
+                    jobs.push(Job {
+                        primitive: p.clone(),
+                        posed: i,
+                        tangents,
+                        name: m.mesh.name(),
+                    });
+                    jobs.len() - 1
+                });
+                m.parts.push((job, material));
+            }
+        }
+        Ok(jobs)
+    }
+
+    /// Reads primitives on all threads. What comes of it, and which error is told, does not
+    /// depend on their number.
+    fn read(
+        &mut self,
+        jobs: &[Job<'a>],
+        posed: &[Posed<'a>],
+    ) -> Result<Vec<Option<ShapeId>>, Problem> {
+        let source = self.source;
+        let done: Vec<_> = jobs
+            .par_iter()
+            .map(|job| {
+                let mut notes = Notes::default();
+                let part = job.read(source, &posed[job.posed], &mut notes);
+                (part, notes)
+            })
+            .collect();
+        let mut shapes = Vec::new();
+        for ((part, notes), job) in done.into_iter().zip(jobs) {
+            self.notes.join(notes);
+            shapes.push(part?.map(|p| match p {
+                Part::Mesh(m) => self.builder.add_mesh(m, &job.name),
+                Part::Spheres(s) => self.builder.add_spheres(s, &job.name),
+            }));
+        }
+        Ok(shapes)
+    }
+
+    fn place_all(&mut self, u: &Use, posed: &Posed<'a>, shapes: &[Option<ShapeId>]) {
+        // The transform of a skinned mesh's node does not count (glTF 2.0, 3.7.3.3).
+        let skinned = posed.skin.as_ref();
+        let skinned = skinned.map(|s| vec![DAffine3::from_translation(s.center)]);
+        let worlds = skinned.as_ref().unwrap_or(&u.worlds);
+        if let Some(shape) = u.sphere {
+            let material = posed.parts.first().map_or(self.default_material, |p| p.1);
+            for world in &u.worlds {
+                self.place(shape, material, *world, u.name.clone());
+            }
+            return;
+        }
+        for &(job, material) in &posed.parts {
+            if let Some(shape) = shapes[job] {
+                for world in worlds {
+                    self.place(shape, material, *world, u.name.clone());
+                }
+            }
+        }
     }
 
     fn place(&mut self, shape: ShapeId, material: MaterialId, world: DAffine3, name: String) {
@@ -135,57 +303,42 @@ impl<'a> Walker<'a, '_> {
             name,
         });
     }
+}
 
-    /// The shapes of a mesh, read once for the same weights of its morph targets.
-    fn mesh(&mut self, index: usize, mesh: &Cursor<'a>, weights: &[f64]) -> Result<Parts, Problem> {
-        let key = (index, weights.iter().map(|w| w.to_bits()).collect());
-        if let Some(known) = self.meshes.get(&key) {
-            return Ok(known.clone());
-        }
-        let shaping = mesh::Shaping {
-            weights,
-            skin: None,
+impl<'a> Job<'a> {
+    fn read(
+        &self,
+        source: &Source<'a>,
+        posed: &Posed<'a>,
+        notes: &mut Notes,
+    ) -> Result<Option<Part>, Problem> {
+        let shaping = Shaping {
+            weights: &posed.weights,
+            skin: posed.skin.as_ref(),
         };
-        let parts = self.read(mesh, shaping)?;
-        self.meshes.insert(key, parts.clone());
-        Ok(parts)
-    }
-
-    fn read(&mut self, mesh: &Cursor<'a>, shaping: mesh::Shaping<'_>) -> Result<Parts, Problem> {
-        let mut parts = Vec::new();
-        for p in mesh.items("primitives")? {
-            let at = variants::material(&p, self.variant)?;
-            let material = match &at {
-                None => self.default_material,
-                Some(m) => *self
-                    .materials
-                    .get(m.index()?)
-                    .ok_or_else(|| m.problem("names a material that does not exist"))?,
-            };
-            let shape = match mesh::read(&p, self.source, shaping, self.notes)? {
-                Some(Part::Mesh(mut triangles)) => {
-                    self.complete(&mut triangles, at.as_ref())?;
-                    self.builder.add_mesh(triangles, &mesh.name())
-                }
-                Some(Part::Spheres(set)) => self.builder.add_spheres(set, &mesh.name()),
-                None => continue,
-            };
-            parts.push((shape, material));
+        let mut part = mesh::read(&self.primitive, source, shaping, notes)?;
+        if let (Some(Part::Mesh(m)), Some(set)) = (&mut part, self.tangents)
+            && !tangents::complete(m, set)
+        {
+            notes.add(tangents::CROWDED, 1);
         }
-        Ok(parts)
+        Ok(part)
     }
+}
 
-    /// Adds the tangents that a material needs, given by where its index stands.
-    fn complete(
-        &mut self,
-        triangles: &mut TriangleMesh,
-        material: Option<&Cursor<'a>>,
-    ) -> Result<(), Problem> {
-        if let Some(m) = material {
-            let material = self.source.root.element("materials", m.index()?, m)?;
-            let set = tangents::wanted(&material)?;
-            if set.is_some_and(|set| !tangents::complete(triangles, set)) {
-                self.notes.add(tangents::CROWDED, 1);
+/// All of a primitive that says something about its shape, as text.
+struct Content<'c, 'a>(&'c Cursor<'a>);
+
+impl std::fmt::Display for Content<'_, '_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for key in ["mode", "attributes", "indices", "targets"] {
+            if let Some(part) = self.0.get(key) {
+                write!(f, "{key} {} ", part.value())?;
+            }
+        }
+        for name in [implicit::NAME, mesh::DRACO] {
+            if let Some(e) = self.0.extension(name) {
+                write!(f, "{name} {} ", e.value())?;
             }
         }
         Ok(())

@@ -1,7 +1,11 @@
 //! Vertex attributes of a primitive, all of one length.
 
+use std::sync::Arc;
+
 use super::Problem;
 use super::accessor::{Accessor, Component, Source};
+#[cfg(feature = "draco")]
+use super::draco::Draco;
 use super::json::Cursor;
 
 /// The vertices of a primitive as single precision; an attribute that is not there is empty.
@@ -29,10 +33,29 @@ pub(super) struct Attributes<'s, 'a> {
     /// Vertices that the accessors have.
     pub(super) count: usize,
     /// The vertices that are read, in ascending order; all if `None`.
-    pub(super) pick: Option<Vec<u32>>,
+    pub(super) pick: Option<Arc<Vec<u32>>>,
+    /// Attributes that are compressed.
+    #[cfg(feature = "draco")]
+    pub(super) draco: Option<Arc<Draco<'a>>>,
 }
 
-impl<'a> Attributes<'_, 'a> {
+impl<'s, 'a> Attributes<'s, 'a> {
+    /// The attributes of the same vertices in a morph target, which is never compressed.
+    pub(super) fn target(&self, map: Cursor<'a>) -> Attributes<'s, 'a> {
+        Attributes {
+            source: self.source,
+            map,
+            count: self.count,
+            pick: self.pick.clone(),
+            #[cfg(feature = "draco")]
+            draco: None,
+        }
+    }
+
+    fn picked(&self) -> Option<&[u32]> {
+        self.pick.as_ref().map(|p| p.as_slice())
+    }
+
     /// Reads all that a surface needs.
     pub(super) fn vertices(&self) -> Result<Vertices, Problem> {
         let ((positions, normals), (rest, uv_sets)) = rayon::join(
@@ -87,9 +110,26 @@ impl<'a> Attributes<'_, 'a> {
         }
     }
 
+    /// What Draco holds of an accessor, if it does.
+    #[cfg(feature = "draco")]
+    fn compressed<const N: usize>(
+        &self,
+        a: &Accessor<'a>,
+    ) -> Result<Option<Vec<[f32; N]>>, Problem> {
+        match &self.draco {
+            None => Ok(None),
+            Some(draco) => draco.floats::<N>(a),
+        }
+    }
+
     /// The values of an accessor, all of which must be numbers.
     fn finite<const N: usize>(&self, a: &Accessor<'a>) -> Result<Vec<[f32; N]>, Problem> {
-        let values = self.source.floats::<N>(a, self.pick.as_deref())?;
+        #[cfg(feature = "draco")]
+        if let Some(values) = self.compressed::<N>(a)? {
+            finite(&values, &a.from)?;
+            return Ok(values);
+        }
+        let values = self.source.floats::<N>(a, self.picked())?;
         if a.component == Component::F32 {
             finite(&values, &a.from)?;
         }
@@ -135,7 +175,7 @@ impl<'a> Attributes<'_, 'a> {
             return Ok(None);
         };
         let from = accessor.from.clone();
-        let joints = self.source.whole::<4>(&accessor, self.pick.as_deref())?;
+        let joints = self.joints(&accessor)?;
         let Some(mut accessor) = self.accessor(&weights)? else {
             return Err(from.problem(format!("has no {weights} beside it")));
         };
@@ -143,6 +183,14 @@ impl<'a> Attributes<'_, 'a> {
         accessor.normalized = true;
         let weights = self.finite::<4>(&accessor)?;
         Ok(Some((from, joints, weights)))
+    }
+
+    fn joints(&self, a: &Accessor<'a>) -> Result<Vec<[u32; 4]>, Problem> {
+        #[cfg(feature = "draco")]
+        if let Some(values) = self.compressed::<4>(a)? {
+            return Ok(values.into_iter().map(|v| v.map(|x| x as u32)).collect());
+        }
+        self.source.whole::<4>(a, self.picked())
     }
 
     fn uv_sets(&self) -> Result<Vec<Vec<[f32; 2]>>, Problem> {

@@ -1,11 +1,15 @@
 //! Buffer views: ranges of buffers, with a bound on what all of them together may grow to.
 
 use std::borrow::Cow;
+#[cfg(feature = "meshopt")]
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::Problem;
 use super::buffer::Buffer;
 use super::json::Cursor;
+#[cfg(feature = "meshopt")]
+use super::meshopt::Packed;
 
 /// The buffer views of a file.
 pub(super) struct Views<'a> {
@@ -13,6 +17,9 @@ pub(super) struct Views<'a> {
     buffers: &'a [Buffer],
     /// Bytes that may still be decoded.
     budget: AtomicUsize,
+    /// What compressed views hold, once somebody asked for it.
+    #[cfg(feature = "meshopt")]
+    unpacked: Vec<OnceLock<Result<Vec<u8>, Problem>>>,
 }
 
 /// A buffer view.
@@ -23,9 +30,18 @@ pub(super) struct View<'a> {
     pub(super) stride: usize,
     /// Number of bytes.
     pub(super) len: usize,
-    start: usize,
-    buffer: &'a Buffer,
+    data: Data<'a>,
 }
+
+enum Data<'a> {
+    /// From this byte on in a buffer.
+    Plain(&'a Buffer, usize),
+    #[cfg(feature = "meshopt")]
+    Unpacked(&'a [u8]),
+}
+
+/// The extensions that compress a view. They differ in name only.
+const COMPRESSION: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// What a file may grow to when it is decoded: a small file has room for a scene, a large one for
 /// the best that compression does. A few bytes that claim gigabytes are refused.
@@ -36,6 +52,13 @@ impl<'a> Views<'a> {
     /// The views of the document `root`, a file of `size` bytes.
     pub(super) fn new(root: Cursor<'a>, buffers: &'a [Buffer], size: usize) -> Self {
         Self {
+            #[cfg(feature = "meshopt")]
+            unpacked: {
+                let views = root.get("bufferViews").and_then(|v| v.value().as_array());
+                (0..views.map_or(0, Vec::len))
+                    .map(|_| OnceLock::new())
+                    .collect()
+            },
             root,
             buffers,
             budget: AtomicUsize::new(size.saturating_mul(GROWTH).saturating_add(BUDGET)),
@@ -59,14 +82,49 @@ impl<'a> Views<'a> {
     }
 
     /// The view whose index stands at `from`.
-    pub(super) fn get(&self, from: &Cursor<'a>) -> Result<View<'a>, Problem> {
-        let at = self.root.element("bufferViews", from.index()?, from)?;
+    pub(super) fn get(&self, from: &Cursor<'a>) -> Result<View<'_>, Problem> {
+        let index = from.index()?;
+        let at = self.root.element("bufferViews", index, from)?;
         let stride = at.index_or("byteStride", 0)?;
-        self.range(at, stride)
+        let packed = COMPRESSION.iter().find_map(|name| at.extension(name));
+        #[cfg(feature = "meshopt")]
+        if let (Some(e), Some(slot)) = (&packed, self.unpacked.get(index)) {
+            let bytes = slot.get_or_init(|| self.unpack(e));
+            return match bytes {
+                Ok(bytes) => Ok(View {
+                    len: bytes.len(),
+                    at,
+                    stride,
+                    data: Data::Unpacked(bytes),
+                }),
+                Err(problem) => Err(problem.clone()),
+            };
+        }
+        let view = self.range(at, stride)?;
+        if let (Some(e), Data::Plain(Buffer::Absent { .. }, _)) = (packed, &view.data) {
+            return Err(Problem::unsupported(
+                e.path(),
+                "is compressed, which this build cannot read",
+                "build with the feature `meshopt`, or export without compression",
+            ));
+        }
+        Ok(view)
+    }
+
+    /// What the extension object `e` compresses.
+    #[cfg(feature = "meshopt")]
+    fn unpack(&self, e: &Cursor<'a>) -> Result<Vec<u8>, Problem> {
+        let packed = Packed::read(e)?;
+        let view = self.range(e.clone(), 0)?;
+        self.claim(packed.count.saturating_mul(packed.stride), e)?;
+        let bytes = view.read(0, view.len)?;
+        packed
+            .decode(&bytes)
+            .ok_or_else(|| e.problem("cannot be decoded: its bytes are damaged"))
     }
 
     /// The bytes of the view whose index stands at `from`.
-    pub(super) fn bytes(&self, from: &Cursor<'a>) -> Result<Cow<'a, [u8]>, Problem> {
+    pub(super) fn bytes(&self, from: &Cursor<'a>) -> Result<Cow<'_, [u8]>, Problem> {
         let view = self.get(from)?;
         view.read(0, view.len)
     }
@@ -91,8 +149,7 @@ impl<'a> Views<'a> {
             at,
             stride,
             len,
-            start,
-            buffer,
+            data: Data::Plain(buffer, start),
         })
     }
 }
@@ -103,8 +160,12 @@ impl<'a> View<'a> {
         if at.checked_add(len).is_none_or(|end| end > self.len) {
             return Err(self.at.problem(format!("ends before byte {at} + {len}")));
         }
-        self.buffer
-            .read(self.start + at, len)
-            .map_err(|e| self.at.problem(format!("cannot be read ({e})")))
+        match self.data {
+            Data::Plain(buffer, start) => buffer
+                .read(start + at, len)
+                .map_err(|e| self.at.problem(format!("cannot be read ({e})"))),
+            #[cfg(feature = "meshopt")]
+            Data::Unpacked(bytes) => Ok(Cow::Borrowed(&bytes[at..at + len])),
+        }
     }
 }
