@@ -64,13 +64,17 @@ impl SurfacePoint {
     #[inline]
     pub(super) fn refine(ray: &Ray, hit: &Hit, object: &Object, shape: &Shape) -> Self {
         let (o, d) = (ray.origin(), ray.direction());
+        let near = Near {
+            t: f64::from(hit.t),
+            first: object.coverage.is_none().then_some(f64::from(ray.tmin)),
+        };
         let on = match &object.placement {
-            None => refine_local(o, d, f64::from(hit.t), hit.prim, shape, None),
+            None => refine_local(o, d, &near, hit.prim, shape, None),
             Some(place) => {
                 // The affine map keeps t; the point goes back through the exact placement.
                 let inv = &place.object_from_world;
                 let (lo, ld) = (inv.transform_point3(o), inv.transform_vector3(d));
-                let mut on = refine_local(lo, ld, f64::from(hit.t), hit.prim, shape, Some(place));
+                let mut on = refine_local(lo, ld, &near, hit.prim, shape, Some(place));
                 let p = place.world_from_object.transform_point3(on.p);
                 let cofactor = inv.matrix3.transpose();
                 // By the inverse transpose an outward normal stays outward, also when the map
@@ -137,6 +141,14 @@ fn unit_and_length(d: DVec3) -> (DVec3, f64) {
     (d * inv, dd * inv)
 }
 
+/// What a backend says of the distance.
+struct Near {
+    /// The distance, with the backend's rounding.
+    t: f64,
+    /// Where the segment begins, if the primitive's first intersection from there on counts.
+    first: Option<f64>,
+}
+
 /// A refined point in the space of the shape.
 struct Refined {
     /// Distance along the ray in units of its direction, which an affine map keeps.
@@ -153,7 +165,7 @@ struct Refined {
 fn refine_local(
     o: DVec3,
     d: DVec3,
-    t: f64,
+    near: &Near,
     prim: u32,
     shape: &Shape,
     place: Option<&Placement>,
@@ -171,7 +183,7 @@ fn refine_local(
                     let (b1, b2) = clamp_barycentrics(h.b1, h.b2);
                     (h.t, b1, b2)
                 }
-                None => (t, 1.0 / 3.0, 1.0 / 3.0),
+                None => (near.t, 1.0 / 3.0, 1.0 / 3.0),
             };
             let ng = normal * (1.0 / normal.length_squared().sqrt());
             let n = mesh
@@ -194,11 +206,13 @@ fn refine_local(
             let line = sphere::line_sphere(V3::<f64>::constant(o), V3::constant(d), c, r);
             let t = match line.roots() {
                 Some([t0, t1]) => {
-                    if (t - t0).abs() <= (t - t1).abs() {
-                        t0
-                    } else {
-                        t1
-                    }
+                    // A far sphere's intersections lie closer together than a backend in single
+                    // precision can tell.
+                    let enters = match near.first {
+                        Some(tmin) => t0 >= tmin,
+                        None => (near.t - t0).abs() <= (near.t - t1).abs(),
+                    };
+                    if enters { t0 } else { t1 }
                 }
                 // The backend saw a graze that exact arithmetic misses: the closest point serves.
                 None => line.t_closest,

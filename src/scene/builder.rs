@@ -193,6 +193,7 @@ impl SceneBuilder {
         let center = self.world_center();
         let geometry = self.bake(center);
         let bounds = geometry.bounds();
+        self.warnings.extend(super::precision::warnings(&geometry));
         let (lights, light_names, geometry) = self.build_lights(geometry, center, bounds)?;
         let mut cameras = self.cameras;
         for c in &mut cameras {

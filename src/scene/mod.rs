@@ -4,6 +4,7 @@ mod builder;
 mod census;
 mod emitters;
 mod light_choice;
+mod precision;
 
 pub use builder::{Emission, MeshPlacement, SceneBuilder, ScenePlugins};
 pub use census::Census;

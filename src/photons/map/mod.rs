@@ -29,6 +29,9 @@ const FLATNESS: f32 = 0.25;
 /// weak that a fixed kernel serves.
 const REACH: f64 = 4.0;
 
+/// The smallest kernel's radius over the largest. Photons in one place would have no density.
+const LEAST: f32 = 1e-4;
+
 /// Where a density is estimated.
 #[derive(Clone, Copy, Debug)]
 pub struct Site {
@@ -112,7 +115,8 @@ impl PhotonMap {
     /// With `k` nearest photons the kernel's radius is the distance to the `k`-th, which itself
     /// is not counted: `Σ_{i<k} / (π r_k²)` is unbiased on uniform light, where counting it would
     /// give a factor `k/(k−1)` too much. Where fewer than `k` lie within the search radius, all
-    /// of them are taken over the disc of that radius.
+    /// of them are taken over the disc of that radius. Of several photons at the `k`-th distance
+    /// one is not counted, whichever: each counts by so much less.
     #[inline]
     pub fn estimate(
         &self,
@@ -127,22 +131,33 @@ impl PhotonMap {
             let photon = &self.photons[i];
             keep(photon.class) && site.accepts(photon.p, photon.ng(), r2)
         });
-        let (full, r2) = found.kernel();
+        let (mut full, mut r2) = found.kernel();
         if found.is_empty() {
             return Estimate {
                 radius: f64::from(self.max_radius),
                 ..Default::default()
             };
         }
-        let mut sum = Rgb::ZERO;
-        let mut counted = 0u32;
+        let least2 = max2 * (LEAST * LEAST);
+        if r2 < least2 {
+            (full, r2) = (false, least2);
+        }
+        let (mut sum, mut rim) = (Rgb::ZERO, Rgb::ZERO);
+        let (mut counted, mut on_rim) = (0u32, 0u32);
         for (i, d2) in found.iter() {
-            if full && d2 >= r2 {
-                continue;
-            }
             let photon = &self.photons[i];
-            sum += f(photon.wi()) * photon.power();
-            counted += 1;
+            let share = f(photon.wi()) * photon.power();
+            if full && d2 >= r2 {
+                rim += share;
+                on_rim += 1;
+            } else {
+                sum += share;
+                counted += 1;
+            }
+        }
+        if on_rim > 1 {
+            sum += rim * (f64::from(on_rim - 1) / f64::from(on_rim));
+            counted += on_rim - 1;
         }
         let inv_area = 1.0 / (PI * f64::from(r2).max(f64::MIN_POSITIVE));
         Estimate {

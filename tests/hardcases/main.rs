@@ -1,0 +1,147 @@
+//! The catalogue of hard cases, row by row: every row runs on the paths it concerns against an
+//! exact or closed-form reference and reports its worst case.
+//!
+//! `cargo test --test hardcases` checks the bounds;
+//! `cargo test --test hardcases -- --ignored write_the_table` writes `docs/hardcases.md`.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+#![allow(unreachable_pub, reason = "shared by the files of this test alone")]
+
+mod boxes;
+#[path = "../common/mod.rs"]
+mod common;
+mod dual;
+mod duals;
+mod exact;
+mod photons;
+mod refraction;
+mod report;
+mod scenes;
+mod spheres;
+mod triangles;
+
+use report::Row;
+
+macro_rules! rows {
+    ($($id:ident: $name:literal in $file:ident;)*) => {
+        const ROWS: &[(&str, &str, fn(&mut Row))] = &[$((stringify!($id), $name, $file::$id)),*];
+        $(#[test]
+        fn $id() {
+            check(stringify!($id), $name, $file::$id);
+        })*
+    };
+}
+
+rows! {
+    s1: "head-on unit sphere" in spheres;
+    s2: "start at the centre and inside" in spheres;
+    s3: "start on the surface, outward" in spheres;
+    s4: "start on the surface, inward" in spheres;
+    s5: "exact tangent" in spheres;
+    s6: "tangent and some last places off" in spheres;
+    s7: "far sphere" in spheres;
+    s8: "small and far" in spheres;
+    s9: "beyond all limits" in spheres;
+    s10: "huge ground sphere" in spheres;
+    s11: "sphere at 1e6" in spheres;
+    s12: "bad radii" in spheres;
+    s13: "ellipsoid instance" in spheres;
+    s14: "thin shell" in spheres;
+    s15: "coincident spheres" in spheres;
+    s16: "touching glass spheres" in spheres;
+    s17: "odd directions" in spheres;
+    t1: "unit triangle" in triangles;
+    t2: "watertight, random rays" in triangles;
+    t3: "watertight, rays at vertices and edges" in triangles;
+    t4: "fan of 200 triangles" in triangles;
+    t5: "pbrt's bad case" in triangles;
+    t6: "no area, bad vertices" in triangles;
+    t7: "slivers" in triangles;
+    t8: "tiny" in triangles;
+    t9: "vanishing" in triangles;
+    t10: "huge" in triangles;
+    t11: "grazing" in triangles;
+    t12: "ray in the plane" in triangles;
+    t13: "spawned off a triangle" in triangles;
+    t14: "neighbour hit" in triangles;
+    t15: "coincident triangles" in triangles;
+    t16: "thin slab" in triangles;
+    t20: "T-junction" in triangles;
+    r1: "critical angle" in refraction;
+    r2: "grazing Fresnel" in refraction;
+    r3: "normal incidence, n = 1" in refraction;
+    r4: "reciprocity" in refraction;
+    r5: "long chain of total reflection" in refraction;
+    r6: "edge of a glass cube" in refraction;
+    d1: "gradients" in duals;
+    d2: "the trap of b² − ac" in duals;
+    d3: "tangency" in duals;
+    d4: "ray through the centre" in duals;
+    d5: "scaling" in duals;
+    d6: "switch of the root" in duals;
+    d9: "two refractions" in duals;
+    d10: "denormal" in duals;
+    b1: "axis-parallel, in a box's face" in boxes;
+    b2: "flat and coincident boxes" in boxes;
+    b3: "bad rays" in boxes;
+    b4: "ends of the interval" in boxes;
+    b5: "backends against each other" in boxes;
+    b6: "instruction sets" in boxes;
+    p1: "bookkeeping of flux" in photons;
+    p3: "extremes of gathering" in photons;
+    p4: "thin wall" in photons;
+}
+
+fn run(id: &'static str, name: &'static str, body: fn(&mut Row)) -> Row {
+    let mut row = Row::new(id, name);
+    body(&mut row);
+    row
+}
+
+fn check(id: &'static str, name: &'static str, body: fn(&mut Row)) {
+    let failures = run(id, name, body).failures();
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+/// Writes `docs/hardcases.md`.
+#[test]
+#[ignore = "writes a file"]
+fn write_the_table() {
+    let mut table = String::new();
+    let mut notes = String::new();
+    let mut failures = Vec::new();
+    for (id, name, body) in ROWS {
+        let row = run(id, name, *body);
+        row.markdown(&mut table, &mut notes);
+        failures.extend(row.failures());
+    }
+    let path = "docs/hardcases.md";
+    let old = std::fs::read_to_string(path).unwrap();
+    let part = |text: &str, mark: &str| text.split_once(mark).unwrap().0.to_string();
+    let (head, rest) = (
+        part(&old, BEGIN),
+        old.split_once(END).unwrap().1.to_string(),
+    );
+    let header = "| row | case | path | what is measured | cases | worst | bound |\n\
+                  |---|---|---|---|---:|---:|---:|\n";
+    let text = format!("{head}{BEGIN}\n{header}{table}\n### Notes\n\n{notes}{END}{rest}");
+    std::fs::write(path, text).unwrap();
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+const BEGIN: &str = "<!-- written by tests/hardcases: begin -->";
+const END: &str = "<!-- end -->";
+
+/// The table in the documents has every row.
+#[test]
+fn the_table_lists_every_row() {
+    let text = std::fs::read_to_string("docs/hardcases.md").unwrap();
+    for (id, name, _) in ROWS {
+        let id = id.to_uppercase();
+        let listed =
+            text.contains(&format!("| {id} | {name} |")) || text.contains(&format!("**{id}**"));
+        assert!(
+            listed,
+            "{id} {name} is not in docs/hardcases.md; write it again"
+        );
+    }
+}
