@@ -188,6 +188,7 @@ fn render_in_pool(
             stages: clock.laps,
             samples_per_pixel: film.sample_range(),
             rejected_pixels: film.rejected(),
+            first_rejected_pixel: film.first_rejected(),
             accelerator: built.backend,
             accelerator_bytes: built.bytes,
             peak_memory_bytes: peak_memory(),

@@ -71,6 +71,8 @@ pub struct Statistics {
     pub samples_per_pixel: (u32, u32),
     /// Pixel sums that were not finite and were left out; above zero is a bug.
     pub rejected_pixels: u64,
+    /// The first of them: column and row.
+    pub first_rejected_pixel: Option<[u32; 2]>,
     /// Name and version of the ray tracing backend.
     pub accelerator: String,
     /// Bytes held by the ray tracing backend.

@@ -79,9 +79,13 @@ pub(super) fn table(s: &Summary) -> String {
     }
     if statistics.rejected_pixels > 0 {
         let n = statistics.rejected_pixels;
+        let [x, y] = statistics.first_rejected_pixel.unwrap_or_default();
         rows.push((
             "BUG",
-            format!("{n} pixel sums were not finite and left out"),
+            format!(
+                "{n} pixel sums were not finite and left out, the first at {x},{y}; please report \
+                 the scene and the command"
+            ),
         ));
     }
     rows.extend(s.outputs.iter().map(|p| ("wrote", p.display().to_string())));

@@ -112,6 +112,7 @@ pub struct Film {
     sums: Vec<[f32; VALUES]>,
     counts: Vec<u32>,
     rejected: u64,
+    first_rejected: Option<[u32; 2]>,
     kept: [bool; 4],
 }
 
@@ -125,6 +126,7 @@ impl Film {
             sums: vec![[0.0; VALUES]; n],
             counts: vec![0; n],
             rejected: 0,
+            first_rejected: None,
             kept: [true; 4],
         }
     }
@@ -149,6 +151,11 @@ impl Film {
         self.rejected
     }
 
+    /// The first pixel (column, row) whose sum was left out.
+    pub fn first_rejected(&self) -> Option<[u32; 2]> {
+        self.first_rejected
+    }
+
     /// Adds the samples of a tile.
     pub fn add(&mut self, tile: &Tile) {
         for (k, sum) in tile.sums.iter().enumerate() {
@@ -167,6 +174,8 @@ impl Film {
                 self.counts[i] += tile.samples;
             } else {
                 self.rejected += 1;
+                let at = [tile.x + dx, tile.y + dy];
+                self.first_rejected.get_or_insert(at);
             }
         }
     }
@@ -292,5 +301,6 @@ mod tests {
             samples: 1,
         });
         assert_eq!((film.rejected(), film.sample_range()), (1, (0, 0)));
+        assert_eq!(film.first_rejected(), Some([0, 0]));
     }
 }
