@@ -325,3 +325,42 @@ fn ellipsoids_are_hit_where_they_are() {
         }
     }
 }
+
+/// A shape that is placed often is in memory once, however it is hidden or squashed; and what is
+/// placed once moves to the world without a copy.
+#[test]
+fn instances_share_one_shape_and_squashed_ones_cost_nothing() {
+    let mut a = Asset::triangle();
+    let scales = a.floats(
+        "VEC3",
+        &[
+            [1., 1., 1.],
+            [2., 1., 3.],
+            [0., 0., 0.],
+            [0., 1., 0.],
+            [1., 1., 0.],
+        ]
+        .concat(),
+    );
+    a.json["nodes"][0]["extensions"] =
+        json!({"EXT_mesh_gpu_instancing": {"attributes": {"SCALE": scales}}});
+    let scene = a.read().unwrap();
+    // Two instances, and the copy that is flat but has an area.
+    assert_eq!(
+        (scene.geometry.shapes.len(), scene.geometry.objects.len()),
+        (2, 3)
+    );
+    assert!(scene.warnings[0].contains("1 without extent"));
+    // A cloud of spheres that is placed twice stays one, too.
+    let radius = a.floats("SCALAR", &[0.1, 0.2, 0.3]);
+    a.json["meshes"][0]["primitives"][0]["mode"] = json!(0);
+    a.attributes()["_RADIUS"] = json!(radius);
+    let places = a.floats("VEC3", &[0., 0., 0., 4., 0., 0.]);
+    a.json["nodes"][0]["extensions"] =
+        json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    let scene = a.read().unwrap();
+    assert_eq!(
+        (scene.geometry.shapes.len(), scene.geometry.objects.len()),
+        (1, 2)
+    );
+}

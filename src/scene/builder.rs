@@ -7,6 +7,7 @@
 
 use std::sync::Arc;
 
+use super::bake;
 use super::emitters::{surface_light, vary};
 use super::{LightChoice, Scene};
 use crate::cameras::CameraDesc;
@@ -14,12 +15,12 @@ use crate::color::Rgb;
 use crate::error::{Error, Result};
 
 use crate::geometry::{
-    Coverage, Geometry, Invalid, LightId, MaterialId, Object, ObjectId, Placement, Shape, ShapeId,
-    SphereSet, TriangleMesh,
+    Coverage, Geometry, Invalid, LightId, MaterialId, ObjectId, Shape, ShapeId, SphereSet,
+    TriangleMesh,
 };
 use crate::lights::{LightDesc, LightEntry};
 use crate::materials::{Material, MaterialDesc, MaterialEntry};
-use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3, Vec3};
+use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3};
 use crate::registry::Table;
 use crate::textures::Texture;
 
@@ -251,60 +252,13 @@ impl SceneBuilder {
     }
 
     fn bake(&mut self, center: DVec3) -> Geometry {
-        let mut users = vec![0usize; self.shapes.len()];
-        for p in &self.placements {
-            users[p.shape.index()] += 1;
-        }
-        let mut geometry = Geometry::default();
-        let mut shared: Vec<Option<ShapeId>> = vec![None; self.shapes.len()];
+        let shapes = std::mem::take(&mut self.shapes);
         let placements = std::mem::take(&mut self.placements);
-        for p in placements {
-            let index = p.shape.index();
-            let mut world = p.world_from_object;
-            world.translation -= center;
-            let push = |geometry: &mut Geometry, shape: Shape| {
-                geometry.shapes.push(shape);
-                ShapeId(geometry.shapes.len() as u32 - 1)
-            };
-            let baked = match &self.shapes[index] {
-                Shape::Spheres(set) => bake_spheres(set, &world).map(Shape::Spheres),
-                Shape::Mesh(mesh) => (users[index] == 1 || Placement::new(world).is_none())
-                    .then(|| Shape::Mesh(bake_mesh(mesh, &world))),
-            };
-            let (shape, placement) = match (baked, Placement::new(world)) {
-                (Some(mut shape), _) => {
-                    // Baking can flatten or overflow what was valid in its own space.
-                    let dropped = match &mut shape {
-                        Shape::Mesh(m) => m.drop_invalid(),
-                        Shape::Spheres(s) => s.drop_invalid(),
-                    };
-                    self.report(dropped, "primitives", &p.name);
-                    (push(&mut geometry, shape), None)
-                }
-                (None, Some(place)) => {
-                    let id = *shared[index]
-                        .get_or_insert_with(|| push(&mut geometry, self.shapes[index].clone()));
-                    (id, Some(place))
-                }
-                (None, None) => {
-                    self.warnings.push(format!(
-                        "{}: its transform is singular, so its spheres are left out",
-                        p.name
-                    ));
-                    continue;
-                }
-            };
-            if geometry.shape(shape).is_empty() {
-                continue;
-            }
-            geometry.objects.push(Object {
-                shape,
-                placement,
-                material: p.material,
-                light: None,
-                coverage: self.materials[p.material.index()].3.clone(),
-                name: Arc::from(p.name),
-            });
+        let mut geometry = bake::bake(shapes, placements, center, |dropped, name| {
+            self.report(dropped, "primitives", name);
+        });
+        for object in &mut geometry.objects {
+            object.coverage = self.materials[object.material.index()].3.clone();
         }
         geometry
     }
@@ -366,79 +320,4 @@ impl SceneBuilder {
         }
         Ok((lights, names, geometry))
     }
-}
-
-fn bake_mesh(mesh: &TriangleMesh, world: &DAffine3) -> TriangleMesh {
-    let normal_matrix = {
-        let m = world.matrix3;
-        // The cofactor matrix is det · inverse transpose, and exists for singular maps too.
-        let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
-        glam::DMat3::from_cols(
-            m.y_axis.cross(m.z_axis) * sign,
-            m.z_axis.cross(m.x_axis) * sign,
-            m.x_axis.cross(m.y_axis) * sign,
-        )
-    };
-    let flip = world.matrix3.determinant() < 0.0;
-    TriangleMesh {
-        positions: mesh
-            .positions
-            .iter()
-            .map(|&p| {
-                world
-                    .transform_point3(Vec3::from(p).as_dvec3())
-                    .as_vec3()
-                    .into()
-            })
-            .collect(),
-        indices: mesh
-            .indices
-            .iter()
-            .map(|&[a, b, c]| if flip { [a, c, b] } else { [a, b, c] })
-            .collect(),
-        normals: mesh
-            .normals
-            .iter()
-            .map(|&n| {
-                (normal_matrix * Vec3::from(n).as_dvec3())
-                    .normalize_or_zero()
-                    .as_vec3()
-                    .into()
-            })
-            .collect(),
-        uv_sets: mesh.uv_sets.clone(),
-        colors: mesh.colors.clone(),
-        tangents: mesh
-            .tangents
-            .iter()
-            .map(|&[x, y, z, w]| {
-                let t = world.transform_vector3(Vec3::new(x, y, z).as_dvec3());
-                let t = t.normalize_or_zero().as_vec3();
-                [t.x, t.y, t.z, if flip { -w } else { w }]
-            })
-            .collect(),
-    }
-}
-
-/// Spheres under a similarity stay spheres; `None` if the map makes ellipsoids of them.
-fn bake_spheres(set: &SphereSet, world: &DAffine3) -> Option<SphereSet> {
-    let m = world.matrix3;
-    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
-    let s2 = x.length_squared();
-    let tolerance = 1e-10 * s2;
-    let similar = (y.length_squared() - s2).abs() <= tolerance
-        && (z.length_squared() - s2).abs() <= tolerance
-        && x.dot(y).abs() <= tolerance
-        && y.dot(z).abs() <= tolerance
-        && z.dot(x).abs() <= tolerance
-        && s2 > 0.0;
-    similar.then(|| SphereSet {
-        spheres: (0..set.spheres.len() as u32)
-            .map(|i| {
-                let (c, r) = set.get(i);
-                let c = world.transform_point3(c).as_vec3();
-                [c.x, c.y, c.z, (r * s2.sqrt()) as f32]
-            })
-            .collect(),
-    })
 }

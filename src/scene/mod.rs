@@ -1,5 +1,6 @@
 //! The scene: arenas with typed ids, written by the one builder, frozen after import.
 
+mod bake;
 mod builder;
 mod census;
 mod emitters;
