@@ -7,9 +7,9 @@ use base64::Engine;
 use base64::engine::general_purpose::{STANDARD, STANDARD_NO_PAD, URL_SAFE};
 use serde_json::Value;
 
-use super::Problem;
 use super::buffer::Buffer;
 use super::json::Cursor;
+use super::{Problem, schema};
 
 /// A parsed file.
 pub(super) struct Document {
@@ -36,6 +36,7 @@ pub(super) fn open(
     drop(text);
     let root = Cursor::root(&json);
     check_version(&root)?;
+    schema::check(&root)?;
     check(&root)?;
     let mut chunk = parts.binary.map(|(at, len)| file.part(at, len));
     let mut buffers = Vec::new();
@@ -113,7 +114,8 @@ fn split(file: &Buffer, path: &Path) -> Result<Parts, Problem> {
             // Chunks of other kinds are for others (glTF 2.0, 4.4.3.1).
             _ => {}
         }
-        at = begin + n.next_multiple_of(4);
+        // The length counts the padding (glTF 2.0, 4.4.3).
+        at = begin + n;
     }
     match json {
         Some(json) => Ok(Parts { json, binary }),
@@ -163,7 +165,7 @@ fn read_buffer(
             data.len()
         )));
     }
-    Ok(data)
+    Ok(data.part(0, length))
 }
 
 /// Whether a buffer is a placeholder for what `EXT_meshopt_compression` unpacks.

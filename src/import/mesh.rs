@@ -8,6 +8,7 @@ use super::skin::Skin;
 use super::vertices::{Attributes, Vertices};
 use super::{Notes, Problem, implicit, morph};
 use crate::geometry::{SphereSet, TriangleMesh};
+use crate::math::{DVec3, Vec3};
 
 /// What a primitive is made of.
 pub(super) enum Part {
@@ -72,15 +73,21 @@ pub(super) fn read<'a>(
         None => order(p, &mut attributes, &position)?,
     };
     let mut vertices = attributes.vertices()?;
+    let (mut indices, mut points) = (Vec::new(), None);
+    if mode == 0 {
+        points = Some(order);
+    } else {
+        indices = triangles(order, vertices.positions.len(), mode);
+        check_normals(&vertices, &indices, &attributes)?;
+    }
     morph::apply(p, &attributes, shaping.weights, &mut vertices)?;
     let mirrored = match shaping.skin {
         Some(skin) => skin.apply(&attributes, &mut vertices)?,
         None => false,
     };
-    if mode == 0 {
+    if let Some(order) = points {
         return Ok(Some(Part::Spheres(spheres(&vertices, order))));
     }
-    let mut indices = triangles(order, vertices.positions.len(), mode);
     if mirrored {
         for [_, b, c] in &mut indices {
             std::mem::swap(b, c);
@@ -159,6 +166,29 @@ fn order<'a>(
         }
     }
     Ok(Some(order))
+}
+
+/// Refuses normals without length, except on triangles without area, which nothing ever hits.
+fn check_normals(
+    v: &Vertices,
+    indices: &[[u32; 3]],
+    attributes: &Attributes<'_, '_>,
+) -> Result<(), Problem> {
+    if !v.normals.contains(&[0.0; 3]) {
+        return Ok(());
+    }
+    for t in indices {
+        let at = t.map(|i| i as usize);
+        let Some(k) = at.iter().find(|&&i| v.normals[i] == [0.0; 3]) else {
+            continue;
+        };
+        let [a, b, c] = at.map(|i| Vec3::from(v.positions[i]).as_dvec3());
+        if (b - a).cross(c - a) != DVec3::ZERO {
+            let normals = attributes.map.need("NORMAL")?;
+            return Err(normals.problem(format!("the normal of vertex {k} has no length")));
+        }
+    }
+    Ok(())
 }
 
 /// The spheres of points, each once.

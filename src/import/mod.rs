@@ -27,6 +27,7 @@ mod mesh;
 mod meshopt;
 mod morph;
 mod node;
+mod schema;
 mod skin;
 mod tangents;
 mod texture;

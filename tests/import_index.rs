@@ -1,0 +1,70 @@
+//! Real files of many exporters, where they are at hand, against the index that says what each of
+//! them is.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use dualight::import::{ImportOptions, load};
+use dualight::scene::{Census, ScenePlugins};
+
+/// Legal files that hold nothing to render, and are refused for that: no node has a mesh that
+/// makes a surface.
+const EMPTY: &str = "holds no";
+
+#[test]
+fn every_file_is_read_or_refused_as_the_index_says() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/real");
+    let Ok(index) = fs::read_to_string(folder.join("index.tsv")) else {
+        return;
+    };
+    let (mut wrong, mut count) = (Vec::new(), BTreeMap::new());
+    for line in index.lines().skip(1) {
+        let column: Vec<&str> = line.split('\t').collect();
+        let (path, kind) = (column[0], column[2]);
+        let result = load(
+            &folder.join(path),
+            &ImportOptions::default(),
+            ScenePlugins::default(),
+        );
+        let should_load = matches!(kind, "valid" | "nonconforming" | "odd");
+        *count.entry(kind).or_insert(0) += 1;
+        match result {
+            Ok(scene) if should_load => {
+                // Instances are counted in other ways by the index, and triangles without area
+                // are dropped.
+                let expected: u64 = column[7].parse().unwrap_or(0);
+                let seen = Census::new(&scene).placed_triangles;
+                if seen < expected / 2 && scene.warnings.is_empty() {
+                    wrong.push(format!("{path}: {seen} triangles of {expected}"));
+                }
+            }
+            Ok(_) => wrong.push(format!("{kind} was read: {path}")),
+            Err(e) if should_load => {
+                if !e.to_string().contains(EMPTY) {
+                    wrong.push(format!("{kind}: {e}"));
+                } else {
+                    println!("empty {path}");
+                }
+            }
+            Err(e) => {
+                let text = e.to_string();
+                println!("{text}");
+                let placed = [": /", "line ", "GLB container"]
+                    .iter()
+                    .any(|p| text.contains(p));
+                if text.lines().count() != 1 || !placed {
+                    wrong.push(format!("without a place: {text}"));
+                }
+                assert_eq!(
+                    e.exit_code(),
+                    if kind == "unsupported" { 3 } else { 1 },
+                    "{text}"
+                );
+            }
+        }
+    }
+    println!("{count:?}");
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
