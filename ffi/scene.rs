@@ -298,6 +298,7 @@ impl CommittedScene {
     }
 
     /// Whether hits of some of its geometries are asked about.
+    #[inline]
     #[must_use]
     pub fn has_filters(&self) -> bool {
         self.filtered
@@ -325,9 +326,9 @@ fn raw_hit(RayHit { ray, hit }: &RayHit) -> Option<RawHit> {
 /// Whether Embree may see this ray.
 #[inline]
 fn is_ray(org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> bool {
-    // Zero times a finite number is zero, times any other it is not a number.
-    let zero =
-        0.0 * org[0] + 0.0 * org[1] + 0.0 * org[2] + 0.0 * dir[0] + 0.0 * dir[1] + 0.0 * dir[2];
+    let all = [org[0], org[1], org[2], dir[0], dir[1], dir[2]];
+    // A sum is only finite if all its terms are; if it is not, it may have overflowed.
+    let finite = all.iter().sum::<f32>().abs() < f32::INFINITY || all.iter().all(|x| x.is_finite());
     // Comparisons with what is not a number are false.
-    zero == 0.0 && dir != [0.0; 3] && 0.0 <= tnear && tnear <= tfar && tnear < f32::INFINITY
+    finite && dir != [0.0; 3] && 0.0 <= tnear && tnear <= tfar && tnear < f32::INFINITY
 }

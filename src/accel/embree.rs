@@ -23,8 +23,6 @@ use crate::math::DAffine3;
 
 struct Embree {
     scene: CommittedScene,
-    /// Whether some surface is not whole.
-    filtered: bool,
     device: Device,
     seconds: f64,
     primitives: u64,
@@ -34,7 +32,7 @@ impl Accelerator for Embree {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let (o, d) = (ray.o.into(), ray.d.into());
-        let h = if self.filtered {
+        let h = if self.scene.has_filters() {
             let key = ray_key(ray);
             self.scene
                 .intersect_filtered(o, d, ray.tmin, ray.tmax, key)?
@@ -53,7 +51,7 @@ impl Accelerator for Embree {
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
         let (o, d) = (ray.o.into(), ray.d.into());
-        if self.filtered {
+        if self.scene.has_filters() {
             let key = ray_key(ray);
             return self.scene.occluded_filtered(o, d, ray.tmin, ray.tmax, key);
         }
@@ -152,7 +150,6 @@ fn build_scene(geometry: &Arc<Geometry>, threads: usize) -> Result<Embree, Embre
         top.attach(&attached, i as u32)?;
     }
     Ok(Embree {
-        filtered: !geometry.is_whole(),
         scene: top.commit()?,
         seconds: start.elapsed().as_secs_f64(),
         primitives: geometry.shapes.iter().map(|s| s.len() as u64).sum(),

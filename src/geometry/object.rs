@@ -213,7 +213,7 @@ impl Geometry {
     }
 
     /// Refines a hit: recomputes everything about it in `f64` on the primitive it names.
-    #[inline]
+    #[inline(always)]
     pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let object = self.object(hit.object);
         SurfacePoint::refine(ray, hit, object, self.shape(object.shape))

@@ -6,14 +6,17 @@ use crate::math::{DVec3, Vec3};
 ///
 /// All backends trace exactly these numbers; refinement promotes them to `f64`. `d` need not be
 /// of unit length; `t` is in units of `|d|`.
+///
+/// In the order in which Embree reads them, so that they are copied four at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Ray {
     /// Origin, world space.
     pub o: Vec3,
-    /// Direction, world space, any length but zero.
-    pub d: Vec3,
     /// Start of the segment.
     pub tmin: f32,
+    /// Direction, world space, any length but zero.
+    pub d: Vec3,
     /// End of the segment.
     pub tmax: f32,
 }

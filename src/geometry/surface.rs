@@ -21,20 +21,17 @@ pub struct Surface<'a> {
     pub sp: &'a SurfacePoint,
     /// The area it stands for, if that is known.
     pub footprint: Option<Footprint>,
-    shape: Option<&'a Shape>,
-    placement: Option<&'a Placement>,
+    geometry: Option<&'a Geometry>,
 }
 
 impl<'a> Surface<'a> {
     /// The point `sp` of `geometry`.
     #[inline]
     pub fn new(geometry: &'a Geometry, sp: &'a SurfacePoint, footprint: Option<Footprint>) -> Self {
-        let object = geometry.object(sp.object);
         Self {
             sp,
             footprint,
-            shape: Some(geometry.shape(object.shape)),
-            placement: object.placement.as_ref(),
+            geometry: Some(geometry),
         }
     }
 
@@ -44,13 +41,21 @@ impl<'a> Surface<'a> {
         Self {
             sp,
             footprint: None,
-            shape: None,
-            placement: None,
+            geometry: None,
         }
     }
 
+    fn shape(&self) -> Option<&'a Shape> {
+        let geometry = self.geometry?;
+        Some(geometry.shape(geometry.object(self.sp.object).shape))
+    }
+
+    fn placement(&self) -> Option<&'a Placement> {
+        self.geometry?.object(self.sp.object).placement.as_ref()
+    }
+
     fn mesh(&self) -> Option<&'a TriangleMesh> {
-        match self.shape {
+        match self.shape() {
             Some(Shape::Mesh(mesh)) => Some(mesh),
             _ => None,
         }
@@ -60,7 +65,7 @@ impl<'a> Surface<'a> {
     /// `z` axis, both from 0 to 1.
     #[inline]
     pub fn uv(&self, set: usize) -> [f64; 2] {
-        match self.shape {
+        match self.shape() {
             Some(Shape::Mesh(mesh)) => mesh.uv(set, self.sp.prim, self.sp.barycentrics),
             Some(Shape::Spheres(_)) => {
                 let n = self.local_normal();
@@ -75,7 +80,7 @@ impl<'a> Surface<'a> {
     }
 
     fn local_normal(&self) -> DVec3 {
-        match self.placement {
+        match self.placement() {
             None => self.sp.ng,
             // A covector goes back by the transpose.
             Some(place) => {
@@ -96,7 +101,7 @@ impl<'a> Surface<'a> {
     /// (`∂p/∂u`, `∂p/∂v`), and in both directions with the parameters of a sphere; `None` where
     /// the coordinates span no area.
     pub fn derivatives(&self, set: usize) -> Option<[DVec3; 2]> {
-        let [du, dv] = match self.shape? {
+        let [du, dv] = match self.shape()? {
             Shape::Mesh(mesh) => {
                 let [p0, p1, p2] = mesh.corners(self.sp.prim);
                 let [a, b, c] = mesh.corner_uvs(set, self.sp.prim);
@@ -123,7 +128,7 @@ impl<'a> Surface<'a> {
                 ]
             }
         };
-        Some(match self.placement {
+        Some(match self.placement() {
             None => [du, dv],
             Some(place) => [du, dv].map(|v| place.world_from_object.transform_vector3(v)),
         })
@@ -140,7 +145,7 @@ impl<'a> Surface<'a> {
         let (t, sign) = match own {
             Some([x, y, z, w]) => {
                 let t = DVec3::new(x, y, z);
-                let (t, flip) = match self.placement {
+                let (t, flip) = match self.placement() {
                     None => (t, false),
                     Some(place) => (
                         place.world_from_object.transform_vector3(t),

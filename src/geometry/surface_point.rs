@@ -1,7 +1,7 @@
 //! What shading knows about a hit.
 
 use super::object::Placement;
-use super::{Hit, Object, Ray, Shape, sphere, triangle};
+use super::{Hit, Object, Ray, Shape, SphereSet, TriangleMesh, sphere, triangle};
 use crate::ad::V3;
 use crate::math::{DVec3, larger, max_abs, robust};
 
@@ -61,41 +61,33 @@ pub struct SurfacePoint {
 
 impl SurfacePoint {
     /// Recomputes a hit on its primitive.
-    #[inline]
+    #[inline(always)]
     pub(super) fn refine(ray: &Ray, hit: &Hit, object: &Object, shape: &Shape) -> Self {
         let (o, d) = (ray.origin(), ray.direction());
         let near = Near {
             t: f64::from(hit.t),
             first: object.coverage.is_none().then_some(f64::from(ray.tmin)),
         };
-        let on = match &object.placement {
-            None => refine_local(o, d, &near, hit.prim, shape, None),
-            Some(place) => {
-                // The affine map keeps t; the point goes back through the exact placement.
-                let inv = &place.object_from_world;
-                let (lo, ld) = (inv.transform_point3(o), inv.transform_vector3(d));
-                let mut on = refine_local(lo, ld, &near, hit.prim, shape, Some(place));
-                let p = place.world_from_object.transform_point3(on.p);
-                let cofactor = inv.matrix3.transpose();
-                // By the inverse transpose an outward normal stays outward, also when the map
-                // mirrors: that is the flip of the winding which glTF 2.0, 3.7.4 asks for.
-                on.ng = (cofactor * on.ng).normalize();
-                on.n = (cofactor * on.n).normalize();
-                on.p = p;
-                on
-            }
+        let on = match (&object.placement, shape) {
+            (None, Shape::Mesh(mesh)) => on_triangle(o, d, &near, hit.prim, mesh),
+            (None, Shape::Spheres(set)) => on_sphere(o, d, &near, hit.prim, set),
+            (Some(place), _) => on_placed(o, d, &near, hit.prim, shape, place),
         };
         let (unit, length) = unit_and_length(d);
         let wo = -unit;
         Self {
             p: on.p,
             ng: on.ng,
-            n: if on.n.dot(on.ng) < 0.0 { -on.n } else { on.n },
+            n: match on.smooth {
+                None => on.ng,
+                Some(n) if n.dot(on.ng) < 0.0 => -n,
+                Some(n) => n,
+            },
             wo,
             front: wo.dot(on.ng) > 0.0,
             distance: on.t * length,
             barycentrics: on.barycentrics,
-            offset: robust::spawn_offset(on.p, on.reach),
+            offset: robust::spawn_offset(on.reach),
             prim: hit.prim,
             object: hit.object,
             material: object.material,
@@ -155,91 +147,94 @@ struct Refined {
     t: f64,
     p: DVec3,
     ng: DVec3,
-    n: DVec3,
+    /// Unit shading normal where it is not `ng`.
+    smooth: Option<DVec3>,
     barycentrics: [f64; 2],
     /// Bound on the coordinates that a backend computes with, in world units.
     reach: f64,
 }
 
 #[inline(always)]
-fn refine_local(
+fn on_triangle(o: DVec3, d: DVec3, near: &Near, prim: u32, mesh: &TriangleMesh) -> Refined {
+    let v = mesh.corners(prim);
+    // A backend may report a hit an ulp outside, or on a triangle seen edge-on:
+    // the point is kept on the triangle.
+    let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
+    let normal = e1.cross(e2);
+    let (o, d) = (V3::<f64>::constant(o), V3::constant(d));
+    let (t, b1, b2) = match triangle::plane_hit(o, d, v[0], e1, e2, normal) {
+        Some(h) => {
+            let (b1, b2) = clamp_barycentrics(h.b1, h.b2);
+            (h.t, b1, b2)
+        }
+        None => (near.t, 1.0 / 3.0, 1.0 / 3.0),
+    };
+    Refined {
+        t,
+        p: v[0] + e1 * b1 + e2 * b2,
+        ng: normal * (1.0 / normal.length_squared().sqrt()),
+        smooth: mesh.normal(prim, b1, b2).and_then(DVec3::try_normalize),
+        barycentrics: [b1, b2],
+        // A backend's rounding grows with the corners, which can be far from the point.
+        reach: larger(larger(max_abs(v[0]), max_abs(v[1])), max_abs(v[2])),
+    }
+}
+
+#[inline(never)]
+fn on_sphere(o: DVec3, d: DVec3, near: &Near, prim: u32, set: &SphereSet) -> Refined {
+    let (c, r) = set.get(prim);
+    let line = sphere::line_sphere(V3::<f64>::constant(o), V3::constant(d), c, r);
+    let t = match line.roots() {
+        Some([t0, t1]) => {
+            // A far sphere's intersections lie closer together than a backend in single
+            // precision can tell.
+            let enters = match near.first {
+                Some(tmin) => t0 >= tmin,
+                None => (near.t - t0).abs() <= (near.t - t1).abs(),
+            };
+            if enters { t0 } else { t1 }
+        }
+        // The backend saw a graze that exact arithmetic misses: the closest point serves.
+        None => line.t_closest,
+    };
+    let n = (o + d * t - c).try_normalize().unwrap_or(DVec3::Z);
+    Refined {
+        t,
+        p: c + n * r,
+        ng: n,
+        smooth: None,
+        barycentrics: [0.0; 2],
+        reach: max_abs(c) + r,
+    }
+}
+
+#[inline(never)]
+fn on_placed(
     o: DVec3,
     d: DVec3,
     near: &Near,
     prim: u32,
     shape: &Shape,
-    place: Option<&Placement>,
+    place: &Placement,
 ) -> Refined {
-    match shape {
-        Shape::Mesh(mesh) => {
-            let v = mesh.corners(prim);
-            // A backend may report a hit an ulp outside, or on a triangle seen edge-on:
-            // the point is kept on the triangle.
-            let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
-            let normal = e1.cross(e2);
-            let (o, d) = (V3::<f64>::constant(o), V3::constant(d));
-            let (t, b1, b2) = match triangle::plane_hit(o, d, v[0], e1, e2, normal) {
-                Some(h) => {
-                    let (b1, b2) = clamp_barycentrics(h.b1, h.b2);
-                    (h.t, b1, b2)
-                }
-                None => (near.t, 1.0 / 3.0, 1.0 / 3.0),
-            };
-            let ng = normal * (1.0 / normal.length_squared().sqrt());
-            let n = mesh
-                .normal(prim, b1, b2)
-                .and_then(DVec3::try_normalize)
-                .unwrap_or(ng);
-            // A backend's rounding grows with the corners, which can be far from the point.
-            let far = larger(larger(max_abs(v[0]), max_abs(v[1])), max_abs(v[2]));
-            Refined {
-                t,
-                p: v[0] + e1 * b1 + e2 * b2,
-                ng,
-                n,
-                barycentrics: [b1, b2],
-                reach: reach(far, place),
-            }
-        }
-        Shape::Spheres(set) => {
-            let (c, r) = set.get(prim);
-            let line = sphere::line_sphere(V3::<f64>::constant(o), V3::constant(d), c, r);
-            let t = match line.roots() {
-                Some([t0, t1]) => {
-                    // A far sphere's intersections lie closer together than a backend in single
-                    // precision can tell.
-                    let enters = match near.first {
-                        Some(tmin) => t0 >= tmin,
-                        None => (near.t - t0).abs() <= (near.t - t1).abs(),
-                    };
-                    if enters { t0 } else { t1 }
-                }
-                // The backend saw a graze that exact arithmetic misses: the closest point serves.
-                None => line.t_closest,
-            };
-            let n = (o + d * t - c).try_normalize().unwrap_or(DVec3::Z);
-            Refined {
-                t,
-                p: c + n * r,
-                ng: n,
-                n,
-                barycentrics: [0.0; 2],
-                reach: reach(max_abs(c) + r, place),
-            }
-        }
-    }
-}
-
-/// A bound `local` on coordinates in the shape's space, carried to the world.
-#[inline]
-fn reach(local: f64, place: Option<&Placement>) -> f64 {
-    match place {
-        None => local,
-        Some(p) => {
-            let m = &p.world_from_object.matrix3;
-            let stretch = m.x_axis.length() + m.y_axis.length() + m.z_axis.length();
-            local * stretch + max_abs(p.world_from_object.translation)
-        }
+    // The affine map keeps t; the point goes back through the exact placement.
+    let (inv, map) = (&place.object_from_world, &place.world_from_object);
+    let (o, d) = (inv.transform_point3(o), inv.transform_vector3(d));
+    let on = match shape {
+        Shape::Mesh(mesh) => on_triangle(o, d, near, prim, mesh),
+        Shape::Spheres(set) => on_sphere(o, d, near, prim, set),
+    };
+    // By the inverse transpose an outward normal stays outward, also when the map mirrors: that
+    // is the flip of the winding which glTF 2.0, 3.7.4 asks for.
+    let cofactor = inv.matrix3.transpose();
+    let stretch =
+        map.matrix3.x_axis.length() + map.matrix3.y_axis.length() + map.matrix3.z_axis.length();
+    Refined {
+        p: map.transform_point3(on.p),
+        ng: (cofactor * on.ng).normalize(),
+        smooth: on.smooth.map(|n| (cofactor * n).normalize()),
+        reach: on.reach * stretch + max_abs(map.translation),
+        ..on
     }
 }
 

@@ -4,9 +4,10 @@
 //! stopped; a sample's random numbers depend on pixel and number alone, so the finished image
 //! does not depend on passes, tiles or threads.
 
+use arrayvec::ArrayVec;
 use rayon::prelude::*;
 
-use super::{Integrator, Scratch, Spacing};
+use super::{BATCH, Integrator, Sample, Scratch, Spacing};
 use crate::cameras::Camera;
 use crate::control::Control;
 use crate::film::{Film, PixelSample, Tile};
@@ -75,26 +76,35 @@ pub fn camera_pass(
                         return None;
                     }
                     let mut scratch = Scratch::default();
-                    let mut sums = Vec::with_capacity((w * h) as usize);
-                    for py in y..y + h {
-                        for px in x..x + w {
-                            let mut sum = PixelSample::default();
-                            let key = u64::from(py) * u64::from(width) + u64::from(px);
-                            for s in done..done + samples {
-                                let mut sampler =
-                                    Sampler::new(seed, stream::CAMERA, key, u64::from(s));
-                                let [jx, jy] = sampler.next_2d();
-                                let (x, y) = (f64::from(px) + jx, f64::from(py) + jy);
-                                integrator.sample(
-                                    spacing.camera_ray(camera, x, y, differentials),
-                                    &mut sampler,
-                                    &mut sum,
-                                    &mut scratch,
-                                );
+                    let mut sums = vec![PixelSample::default(); (w * h) as usize];
+                    let mut batch = ArrayVec::<Sample, BATCH>::new();
+                    let mut take = |batch: &mut ArrayVec<Sample, BATCH>| {
+                        integrator.sample(batch, &mut sums, &mut scratch);
+                        batch.clear();
+                    };
+                    let pixels = (y..y + h).flat_map(|py| (x..x + w).map(move |px| (px, py)));
+                    for (pixel, (px, py)) in pixels.enumerate() {
+                        // Which samples of a pixel go together must not depend on its neighbours,
+                        // or the rounding of its sum would.
+                        if batch.len() + samples as usize > BATCH {
+                            take(&mut batch);
+                        }
+                        let key = u64::from(py) * u64::from(width) + u64::from(px);
+                        for s in done..done + samples {
+                            let mut sampler = Sampler::new(seed, stream::CAMERA, key, u64::from(s));
+                            let [jx, jy] = sampler.next_2d();
+                            let (x, y) = (f64::from(px) + jx, f64::from(py) + jy);
+                            batch.push(Sample {
+                                camera: spacing.camera_ray(camera, x, y, differentials),
+                                sampler,
+                                pixel,
+                            });
+                            if batch.is_full() {
+                                take(&mut batch);
                             }
-                            sums.push(sum);
                         }
                     }
+                    take(&mut batch);
                     stage.advance(u64::from(w * h) * u64::from(samples));
                     Some((
                         Tile {

@@ -62,12 +62,15 @@ impl Trail {
     /// Carries the differential of `ray` to `sp`, if there is one.
     #[inline]
     pub(super) fn land(
-        differential: Option<Differential>,
+        differential: &Option<Differential>,
         scene: &Scene,
         ray: &Ray,
         sp: &SurfacePoint,
     ) -> Self {
-        Self(differential.and_then(|d| d.land(&scene.geometry, ray, sp)))
+        match differential {
+            None => Self(None),
+            Some(d) => Self(d.land(&scene.geometry, ray, sp)),
+        }
     }
 
     /// What textures average over.

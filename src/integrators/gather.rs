@@ -22,14 +22,6 @@ const NEAR: f64 = 2.0;
 /// How often a gather path may go one surface further.
 const NEAR_STEPS: u32 = 3;
 
-/// A final-gather path at its next diffuse surface.
-struct Gathered {
-    sp: SurfacePoint,
-    trail: Trail,
-    bsdf: Bsdf,
-    beta: Rgb,
-}
-
 /// What a gather ray meets before any surface that scatters.
 enum Seen<'a> {
     /// A light.
@@ -65,9 +57,10 @@ impl PhotonMapping<'_> {
         scratch: &mut Scratch,
     ) -> DiffuseLight {
         let cx = &self.cx;
-        let filtered;
+        let mut filtered;
         let bsdf = if full.has_specular() {
-            filtered = full.diffuse_only();
+            filtered = full.clone();
+            filtered.keep_diffuse();
             &filtered
         } else {
             full
@@ -141,7 +134,7 @@ impl PhotonMapping<'_> {
             scratch.rays.gather += 1;
             let shadow = f64::from(n_shadow);
             let mut seen = Rgb::ZERO;
-            let next = self.next_diffuse(start, s.weight, sampler, scratch, |on, beta| {
+            let reflected = self.gather(start, s.weight, sampler, scratch, 0, |on, beta| {
                 seen = beta
                     * match on {
                         Seen::Light(on, footprint) => {
@@ -153,23 +146,23 @@ impl PhotonMapping<'_> {
                     };
             });
             light.direct += seen * share;
-            if let Some(next) = next {
-                light.indirect += self.reflected(next, sampler, scratch, 0) * share;
-            }
+            light.indirect += reflected * share;
         }
         light
     }
 
-    /// Follows a ray along specular surfaces to the next diffuse one. `on_light` is called if
-    /// the ray meets a light before any surface.
-    fn next_diffuse(
+    /// Follows a ray along specular surfaces to the next diffuse one: what that reflects, times
+    /// the throughput. `on_light` is called if the ray meets a light before any surface. `steps`
+    /// are the diffuse surfaces that the path has gone on from.
+    fn gather(
         &self,
         start: CameraRay,
         mut beta: Rgb,
         sampler: &mut Sampler,
         scratch: &mut Scratch,
+        steps: u32,
         mut on_light: impl FnMut(Seen<'_>, Rgb),
-    ) -> Option<Gathered> {
+    ) -> Rgb {
         let cx = &self.cx;
         let CameraRay {
             mut ray,
@@ -180,105 +173,94 @@ impl PhotonMapping<'_> {
                 if depth == 0 {
                     on_light(Seen::Sky(&ray), beta);
                 }
-                return None;
+                return Rgb::ZERO;
             };
             let sp = cx.scene.surface_point(&ray, &hit);
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
-            let trail = Trail::land(differential, cx.scene, &ray, &sp);
+            let trail = Trail::land(&differential, cx.scene, &ray, &sp);
             if depth == 0 && sp.light.is_some() {
                 on_light(Seen::Light(&sp, trail.footprint()), beta);
             }
-            let bsdf = cx
-                .scene
-                .bsdf(&sp, trail.footprint(), TransportMode::Radiance);
+            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
+            cx.scene.scatter(&sp, trail.footprint(), &mut bsdf);
             let diffuse = bsdf.has_diffuse();
             if diffuse && !bsdf.has_specular() {
-                return Some(Gathered {
-                    sp,
-                    trail,
-                    bsdf,
-                    beta,
-                });
+                return beta * self.reflected(&sp, &trail, &bsdf, sampler, scratch, steps);
             }
             // A surface of both kinds: one of them is followed, by its share.
-            let specular = if diffuse {
+            if diffuse {
                 let p = bsdf.diffuse_probability();
                 if sampler.next_1d() < p {
-                    let bsdf = bsdf.diffuse_only();
-                    return Some(Gathered {
-                        sp,
-                        trail,
-                        bsdf,
-                        beta: beta / p,
-                    });
+                    bsdf.keep_diffuse();
+                    let reflected = self.reflected(&sp, &trail, &bsdf, sampler, scratch, steps);
+                    return beta / p * reflected;
                 }
                 beta = beta / (1.0 - p);
-                bsdf.specular_only()
-            } else {
-                bsdf
+                bsdf.keep_specular();
+            }
+            let Some(s) = bsdf.sample(sampler.next_1d(), sampler.next_2d()) else {
+                return Rgb::ZERO;
             };
-            let s = specular.sample(sampler.next_1d(), sampler.next_2d())?;
             beta *= s.weight;
             let survive = beta.max_channel().min(1.0);
             if depth >= ROULETTE_DEPTH {
                 if sampler.next_1d() >= survive {
-                    return None;
+                    return Rgb::ZERO;
                 }
                 beta = beta / survive;
             }
             if beta.is_black() {
-                return None;
+                return Rgb::ZERO;
             }
             ray = sp.spawn(s.wi);
             differential = trail.leave(&sp, &s);
             scratch.rays.gather += 1;
         }
-        None
+        Rgb::ZERO
     }
 
-    /// Radiance that a gather ray sees reflected at a diffuse surface, times its throughput.
+    /// Radiance that a gather ray sees reflected at a diffuse surface.
     fn reflected(
         &self,
-        at: Gathered,
+        sp: &SurfacePoint,
+        trail: &Trail,
+        bsdf: &Bsdf,
         sampler: &mut Sampler,
         scratch: &mut Scratch,
         steps: u32,
     ) -> Rgb {
         let cx = &self.cx;
         let stored = Stored { maps: cx.maps };
-        let sites = sites(&at.sp, &at.bsdf);
+        let sites = sites(sp, bsdf);
         let near = stored.irradiance(&sites[0], scratch);
         let radius = near.map_or(0.0, |s| f64::from(s.radius));
-        if at.sp.distance >= NEAR * radius || steps >= NEAR_STEPS {
-            return at.beta
-                * match (at.bsdf.as_lambert(), near) {
-                    (Some(albedo), Some(s)) => albedo * s.irradiance() * FRAC_1_PI,
-                    (Some(_), None) => Rgb::ZERO,
-                    (None, _) => stored.reflected(&sites, &at.bsdf, scratch),
-                };
+        if sp.distance >= NEAR * radius || steps >= NEAR_STEPS {
+            return match (bsdf.as_lambert(), near) {
+                (Some(albedo), Some(s)) => albedo * s.irradiance() * FRAC_1_PI,
+                (Some(_), None) => Rgb::ZERO,
+                (None, _) => stored.reflected(&sites, bsdf, scratch),
+            };
         }
         // Too near: direct light and glow here, the rest from one surface further. (Caustics here
         // are the glow of the surface that the gather ray left.)
-        let mut sum = stored.glow(&sites, &at.bsdf, scratch);
-        if let Some(direct) = sample_direct(cx, &at.sp, &at.bsdf, sampler.next_2d(), 1.0, 0.0) {
+        let mut sum = stored.glow(&sites, bsdf, scratch);
+        if let Some(direct) = sample_direct(cx, sp, bsdf, sampler.next_2d(), 1.0, 0.0) {
             scratch.rays.shadow += 1;
             if !cx.accel.occluded(&direct.ray) {
                 sum += direct.value.diffuse;
             }
         }
         let u = sampler.next_2d();
-        if let Some(s) = at.bsdf.sample(sampler.next_1d(), u) {
+        if let Some(s) = bsdf.sample(sampler.next_1d(), u) {
             let start = CameraRay {
-                ray: at.sp.spawn(s.wi),
-                differential: at.trail.leave(&at.sp, &s),
+                ray: sp.spawn(s.wi),
+                differential: trail.leave(sp, &s),
             };
             scratch.rays.gather += 1;
-            if let Some(next) = self.next_diffuse(start, s.weight, sampler, scratch, |_, _| ()) {
-                sum += self.reflected(next, sampler, scratch, steps + 1);
-            }
+            sum += self.gather(start, s.weight, sampler, scratch, steps + 1, |_, _| ());
         }
-        at.beta * sum
+        sum
     }
 }

@@ -61,7 +61,7 @@ pub(super) struct DirectSample {
 
 /// Picks a light by flux and a point on it. `n_light` of these are taken against `n_bsdf`
 /// samples of the BSDF, whose hits on the light weigh against these; 0 if there are none.
-#[inline]
+#[inline(always)]
 pub(super) fn sample_direct(
     cx: &RenderContext<'_>,
     sp: &SurfacePoint,

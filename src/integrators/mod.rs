@@ -40,14 +40,24 @@ pub struct RenderContext<'a> {
 
 /// Estimates radiance along camera rays.
 pub trait Integrator: Send + Sync {
-    /// Adds the sample of one camera ray to `out`; `scratch` is the calling thread's own.
-    fn sample(
-        &self,
-        camera: CameraRay,
-        sampler: &mut Sampler,
-        out: &mut PixelSample,
-        scratch: &mut Scratch,
-    );
+    /// Takes samples and adds each to the sum of its pixel; `scratch` is the calling thread's
+    /// own. The samples have nothing to do with each other: an integrator may walk their paths
+    /// side by side.
+    fn sample(&self, batch: &mut [Sample], sums: &mut [PixelSample], scratch: &mut Scratch);
+}
+
+/// Most samples that are taken side by side.
+const BATCH: usize = 16;
+
+/// A sample that is to be taken.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    /// Where it begins.
+    pub camera: CameraRay,
+    /// Its random numbers.
+    pub sampler: Sampler,
+    /// Index of the sum that it is added to.
+    pub pixel: usize,
 }
 
 /// A ray from the camera.

@@ -3,12 +3,16 @@
 //!
 //! Source: Kajiya, *The Rendering Equation*, 1986; Veach 1997, chapters 8 to 10.
 
+use arrayvec::ArrayVec;
+
 use super::footprint::Trail;
 use super::light_sampling::{escaped, power_heuristic, sample_direct};
-use super::{CameraRay, Integrator, IntegratorEntry, RenderContext, Scratch};
+use super::{BATCH, Integrator, IntegratorEntry, RenderContext, Sample, Scratch};
 use crate::color::Rgb;
 use crate::film::{Component, PixelSample};
-use crate::materials::{LobeClass, TransportMode};
+use crate::geometry::{Differential, Ray, SurfacePoint};
+use crate::materials::{Bsdf, BsdfValue, LobeClass, TransportMode};
+use crate::math::DVec3;
 use crate::sampling::Sampler;
 
 /// Scattering events after which roulette begins.
@@ -67,100 +71,184 @@ struct Path<'a> {
     cx: RenderContext<'a>,
 }
 
+/// A path on its way.
+struct Walker {
+    ray: Ray,
+    differential: Option<Differential>,
+    sampler: Sampler,
+    beta: Rgb,
+    walk: Walk,
+    /// Density and origin of the last BSDF sample; none for a delta lobe or the camera.
+    last: Option<(f64, DVec3)>,
+    /// Index of the sum that it adds to.
+    pixel: usize,
+}
+
+impl Walker {
+    fn new(sample: &Sample) -> Self {
+        Self {
+            ray: sample.camera.ray,
+            differential: sample.camera.differential,
+            sampler: sample.sampler.clone(),
+            beta: Rgb::ONE,
+            walk: Walk::Camera,
+            last: None,
+            pixel: sample.pixel,
+        }
+    }
+}
+
+/// Light that arrives if nothing stands in its way.
+struct Direct {
+    ray: Ray,
+    value: BsdfValue,
+    walk: Walk,
+    pixel: usize,
+}
+
 impl Integrator for Path<'_> {
-    fn sample(
-        &self,
-        camera: CameraRay,
-        sampler: &mut Sampler,
-        out: &mut PixelSample,
-        scratch: &mut Scratch,
-    ) {
-        let cx = &self.cx;
-        let max_depth = cx.settings.max_depth.unwrap_or(DEPTH_GUARD);
-        let CameraRay {
-            mut ray,
-            mut differential,
-        } = camera;
-        let mut beta = Rgb::ONE;
-        let mut walk = Walk::Camera;
-        // Density and origin of the last BSDF sample; none for a delta lobe or the camera.
-        let mut last: Option<(f64, crate::math::DVec3)> = None;
-        scratch.rays.camera += 1;
+    fn sample(&self, batch: &mut [Sample], sums: &mut [PixelSample], scratch: &mut Scratch) {
+        for batch in batch.chunks(BATCH) {
+            self.walk(batch, sums, scratch);
+        }
+    }
+}
+
+impl Path<'_> {
+    /// Walks several paths, each step of all of them together: shading is a long chain of
+    /// dependent operations, and the processor works on those of several paths at a time if no
+    /// search lies between them.
+    fn walk(&self, batch: &[Sample], sums: &mut [PixelSample], scratch: &mut Scratch) {
+        let (accel, scene) = (self.cx.accel, self.cx.scene);
+        let mut walkers: ArrayVec<Walker, BATCH> = ArrayVec::new();
+        walkers.extend(batch.iter().map(Walker::new));
+        let mut alive: ArrayVec<usize, BATCH> = (0..walkers.len()).collect();
+        let mut points: ArrayVec<SurfacePoint, BATCH> = ArrayVec::new();
+        let mut lights: ArrayVec<Direct, BATCH> = ArrayVec::new();
+        scratch.rays.camera += alive.len() as u64;
         for depth in 0.. {
-            let Some(hit) = cx.accel.intersect(&ray) else {
-                if depth > 0 || cx.settings.background {
-                    out.add(walk.component(), beta * escaped(cx, &ray, last, 1.0, 1.0));
+            alive.retain(|&mut i| {
+                let w = &walkers[i];
+                let hit = accel.intersect(&w.ray);
+                match &hit {
+                    Some(hit) => points.push(scene.surface_point(&w.ray, hit)),
+                    None => self.escape(depth, w, &mut sums[w.pixel]),
                 }
-                break;
-            };
-            let sp = cx.scene.surface_point(&ray, &hit);
-            if let Some(t) = cx.scene.transmittance(&sp) {
-                beta *= t;
-            }
-            if depth == 0 {
-                out.alpha += 1.0;
-                out.normal += sp.n;
-                out.position += sp.p + cx.scene.center;
-                out.depth += sp.distance;
-            }
-            let trail = Trail::land(differential, cx.scene, &ray, &sp);
-            if sp.light.is_some() {
-                let le = cx.scene.emitted(&sp, trail.footprint());
-                if !le.is_black() {
-                    let weight = last.map_or(1.0, |(pdf, from)| {
-                        power_heuristic(1.0, pdf, 1.0, cx.scene.pdf_light(from, &sp))
-                    });
-                    out.add(walk.component(), beta * le * weight);
-                }
-            }
-            let bsdf = cx
-                .scene
-                .bsdf(&sp, trail.footprint(), TransportMode::Radiance);
-            if depth == 0 {
-                out.albedo += bsdf.albedo();
-            }
-            if let Some(color) = bsdf.shown() {
-                if matches!(walk, Walk::Camera | Walk::Specular) {
-                    out.add(walk.component(), beta * color);
-                }
-                break;
-            }
-            if depth >= max_depth {
-                break;
-            }
-            if bsdf.has_finite() {
-                let u = sampler.next_2d();
-                if let Some(direct) = sample_direct(cx, &sp, &bsdf, u, 1.0, 1.0) {
-                    scratch.rays.shadow += 1;
-                    if !cx.accel.occluded(&direct.ray) {
-                        let diffuse = walk.after(LobeClass::Diffuse).component();
-                        out.add(diffuse, beta * direct.value.diffuse);
-                        let glossy = walk.after(LobeClass::Glossy).component();
-                        out.add(glossy, beta * direct.value.glossy);
+                hit.is_some()
+            });
+            let mut met = points.iter();
+            alive.retain(|&mut i| {
+                let w = &mut walkers[i];
+                met.next()
+                    .is_some_and(|sp| self.scatter(depth, w, sp, &mut sums[w.pixel], &mut lights))
+            });
+            scratch.rays.shadow += lights.len() as u64;
+            scratch.rays.bounce += alive.len() as u64;
+            for light in &lights {
+                if !accel.occluded(&light.ray) {
+                    let sum = &mut sums[light.pixel];
+                    let diffuse = light.walk.after(LobeClass::Diffuse).component();
+                    sum.add(diffuse, light.value.diffuse);
+                    if !light.value.glossy.is_black() {
+                        let glossy = light.walk.after(LobeClass::Glossy).component();
+                        sum.add(glossy, light.value.glossy);
                     }
                 }
             }
-            let u = sampler.next_2d();
-            let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
-                break;
-            };
-            beta *= s.weight;
-            walk = walk.after(s.class);
-            last = (s.class != LobeClass::Delta).then_some((s.pdf, sp.p));
-            if cx.settings.roulette && depth + 1 >= ROULETTE_DEPTH {
-                let survive = (beta.max_channel() / ROULETTE_WEIGHT).min(1.0);
-                if sampler.next_1d() >= survive {
-                    break;
-                }
-                beta = beta / survive;
-            }
-            if beta.is_black() {
+            points.clear();
+            lights.clear();
+            if alive.is_empty() {
                 break;
             }
-            ray = sp.spawn(s.wi);
-            differential = trail.leave(&sp, &s);
-            scratch.rays.bounce += 1;
         }
+    }
+
+    /// Takes the light from beyond the scene that a path has met.
+    fn escape(&self, depth: u32, w: &Walker, out: &mut PixelSample) {
+        let cx = &self.cx;
+        if depth > 0 || cx.settings.background {
+            let radiance = escaped(cx, &w.ray, w.last, 1.0, 1.0);
+            out.add(w.walk.component(), w.beta * radiance);
+        }
+    }
+
+    /// What happens where a path has met a surface: takes the light that is found there to the
+    /// pixel's sum, asks for light from elsewhere, and turns the path into a new direction.
+    /// Whether it goes on.
+    #[inline(always)]
+    fn scatter(
+        &self,
+        depth: u32,
+        w: &mut Walker,
+        sp: &SurfacePoint,
+        out: &mut PixelSample,
+        lights: &mut ArrayVec<Direct, BATCH>,
+    ) -> bool {
+        let cx = &self.cx;
+        if let Some(t) = cx.scene.transmittance(sp) {
+            w.beta *= t;
+        }
+        if depth == 0 {
+            out.alpha += 1.0;
+            out.normal += sp.n;
+            out.position += sp.p + cx.scene.center;
+            out.depth += sp.distance;
+        }
+        let trail = Trail::land(&w.differential, cx.scene, &w.ray, sp);
+        if sp.light.is_some() {
+            let le = cx.scene.emitted(sp, trail.footprint());
+            if !le.is_black() {
+                let weight = w.last.map_or(1.0, |(pdf, from)| {
+                    power_heuristic(1.0, pdf, 1.0, cx.scene.pdf_light(from, sp))
+                });
+                out.add(w.walk.component(), w.beta * le * weight);
+            }
+        }
+        let mut bsdf = Bsdf::new(sp, TransportMode::Radiance);
+        cx.scene.scatter(sp, trail.footprint(), &mut bsdf);
+        if depth == 0 {
+            out.albedo += bsdf.albedo();
+        }
+        if let Some(color) = bsdf.shown() {
+            if matches!(w.walk, Walk::Camera | Walk::Specular) {
+                out.add(w.walk.component(), w.beta * color);
+            }
+            return false;
+        }
+        if depth >= cx.settings.max_depth.unwrap_or(DEPTH_GUARD) {
+            return false;
+        }
+        if bsdf.has_finite() {
+            let u = w.sampler.next_2d();
+            if let Some(direct) = sample_direct(cx, sp, &bsdf, u, 1.0, 1.0) {
+                lights.push(Direct {
+                    ray: direct.ray,
+                    value: direct.value * w.beta,
+                    walk: w.walk,
+                    pixel: w.pixel,
+                });
+            }
+        }
+        let u = w.sampler.next_2d();
+        let Some(s) = bsdf.sample(w.sampler.next_1d(), u) else {
+            return false;
+        };
+        w.beta *= s.weight;
+        w.walk = w.walk.after(s.class);
+        w.last = (s.class != LobeClass::Delta).then_some((s.pdf, sp.p));
+        if cx.settings.roulette && depth + 1 >= ROULETTE_DEPTH {
+            let survive = (w.beta.max_channel() / ROULETTE_WEIGHT).min(1.0);
+            if w.sampler.next_1d() >= survive {
+                return false;
+            }
+            w.beta = w.beta / survive;
+        }
+        if w.beta.is_black() {
+            return false;
+        }
+        w.ray = sp.spawn(s.wi);
+        w.differential = trail.leave(sp, &s);
+        true
     }
 }
 

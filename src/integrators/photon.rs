@@ -13,14 +13,14 @@
 
 use super::footprint::Trail;
 use super::light_sampling::{escaped, power_heuristic, sample_direct};
-use super::{CameraRay, Integrator, IntegratorEntry, RenderContext, Scratch};
+use super::{Integrator, IntegratorEntry, RenderContext, Sample, Scratch};
 use arrayvec::ArrayVec;
 
 use crate::color::Rgb;
 use crate::effects::EffectSet;
 use crate::film::{Component, PixelSample};
 use crate::geometry::{Differential, Ray};
-use crate::materials::{LobeClass, TransportMode};
+use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::math::DVec3;
 use crate::sampling::Sampler;
 
@@ -58,32 +58,28 @@ struct Chain {
 }
 
 impl Integrator for PhotonMapping<'_> {
-    fn sample(
-        &self,
-        camera: CameraRay,
-        sampler: &mut Sampler,
-        out: &mut PixelSample,
-        scratch: &mut Scratch,
-    ) {
-        scratch.rays.camera += 1;
-        let mut pending = ArrayVec::<Chain, MAX_CHAINS>::new();
-        pending.push(Chain {
-            ray: camera.ray,
-            differential: camera.differential,
-            beta: Rgb::ONE,
-            depth: 0,
-            last: None,
-        });
-        let mut diffuse_seen = false;
-        while let Some(chain) = pending.pop() {
-            self.follow(
-                chain,
-                sampler,
-                out,
-                scratch,
-                &mut pending,
-                &mut diffuse_seen,
-            );
+    fn sample(&self, batch: &mut [Sample], sums: &mut [PixelSample], scratch: &mut Scratch) {
+        scratch.rays.camera += batch.len() as u64;
+        for sample in batch {
+            let mut pending = ArrayVec::<Chain, MAX_CHAINS>::new();
+            pending.push(Chain {
+                ray: sample.camera.ray,
+                differential: sample.camera.differential,
+                beta: Rgb::ONE,
+                depth: 0,
+                last: None,
+            });
+            let mut diffuse_seen = false;
+            while let Some(chain) = pending.pop() {
+                self.follow(
+                    chain,
+                    &mut sample.sampler,
+                    &mut sums[sample.pixel],
+                    scratch,
+                    &mut pending,
+                    &mut diffuse_seen,
+                );
+            }
         }
     }
 }
@@ -124,10 +120,9 @@ impl PhotonMapping<'_> {
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
-            let trail = Trail::land(differential, cx.scene, &ray, &sp);
-            let bsdf = cx
-                .scene
-                .bsdf(&sp, trail.footprint(), TransportMode::Radiance);
+            let trail = Trail::land(&differential, cx.scene, &ray, &sp);
+            let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
+            cx.scene.scatter(&sp, trail.footprint(), &mut bsdf);
             if depth == 0 {
                 out.alpha += 1.0;
                 out.albedo += bsdf.albedo();
@@ -183,7 +178,7 @@ impl PhotonMapping<'_> {
             if !bsdf.has_specular() || !cx.effects.intersects(chains) {
                 return;
             }
-            let bsdf = bsdf.specular_only();
+            bsdf.keep_specular();
             if depth < SPLIT_DEPTH {
                 // Reflection and refraction are both followed: their shares are known exactly,
                 // and a rare bright reflection is the worst noise that glass has.

@@ -25,6 +25,8 @@ struct AreaLight {
     /// In proportion to area, or to flux where a map varies it.
     choose: Discrete,
     area: f64,
+    /// Density in area of uniform points, 1/m².
+    pdf_area: f64,
     map: Option<Mapped>,
     around: BoundingSphere,
     /// Luminance of the flux of one side.
@@ -50,13 +52,13 @@ struct Point<'a> {
 
 impl AreaLight {
     /// A random point.
-    #[inline]
+    #[inline(always)]
     fn point(&self, u: [f64; 2]) -> Option<Point<'_>> {
         let (i, _, rest) = self.choose.sample(u[0])?;
         let triangle = &self.triangles[i];
         let b = warp::triangle([rest, u[1]]);
         let (radiance, pdf_area) = match &self.map {
-            None => (self.radiance, 1.0 / self.area),
+            None => (self.radiance, self.pdf_area),
             Some(m) => (self.radiance * m.map.at(i as u32, b), m.pdf_area[i]),
         };
         Some(Point {
@@ -109,7 +111,7 @@ impl Light for AreaLight {
             return 0.0;
         }
         let pdf_area = match &self.map {
-            None => 1.0 / self.area,
+            None => self.pdf_area,
             Some(m) => m.pdf_area[on.prim as usize],
         };
         (on.p - p).length_squared() * pdf_area / cos
@@ -207,7 +209,7 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
                 e1,
                 e2,
                 ng: cross.normalize_or_zero(),
-                offset: robust::spawn_offset(DVec3::ZERO, far),
+                offset: robust::spawn_offset(far),
             }
         })
         .collect();
@@ -258,6 +260,7 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
         triangles,
         choose,
         area,
+        pdf_area: 1.0 / area,
         map,
     }))
 }

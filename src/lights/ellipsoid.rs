@@ -52,7 +52,7 @@ impl EllipsoidLight {
         let m = &self.world.matrix3;
         let stretch = m.x_axis.length() + m.y_axis.length() + m.z_axis.length();
         let reach = (max_abs(s.center) + s.radius) * stretch + max_abs(self.world.translation);
-        robust::spawn_offset(DVec3::ZERO, reach)
+        robust::spawn_offset(reach)
     }
 
     /// Density of [`Light::sample_li`] along the unit direction `wi`, once a sphere is chosen.

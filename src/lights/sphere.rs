@@ -25,7 +25,7 @@ fn cone_complement(s: &BoundingSphere, d2: f64) -> f64 {
 
 impl SphereLight {
     fn offset(s: &BoundingSphere) -> f64 {
-        robust::spawn_offset(DVec3::ZERO, max_abs(s.center) + s.radius)
+        robust::spawn_offset(max_abs(s.center) + s.radius)
     }
 
     /// Density of [`Light::sample_li`] once sphere `s` is chosen, for `cos` at the light.

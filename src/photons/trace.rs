@@ -9,7 +9,7 @@ use super::{EmittedPhoton, PhotonSettings};
 use crate::accel::Accelerator;
 use crate::control::Control;
 use crate::lights::range_window;
-use crate::materials::{LobeClass, TransportMode};
+use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::sampling::{Rng, hash2, stream};
 use crate::scene::Scene;
 use crate::stats::{PhotonCounts, RayCounts};
@@ -132,7 +132,8 @@ impl Tracer<'_> {
                 out.ledger.absorbed += power - left;
                 power = left;
             }
-            let mut bsdf = self.scene.bsdf(&sp, None, TransportMode::Importance);
+            let mut bsdf = Bsdf::new(&sp, TransportMode::Importance);
+            self.scene.scatter(&sp, None, &mut bsdf);
             if bsdf.has_diffuse() {
                 let ng = if sp.front { sp.ng } else { -sp.ng };
                 let photon = Photon::new(sp.p, sp.wo, ng, power, class);
@@ -151,7 +152,7 @@ impl Tracer<'_> {
                         out.ledger.discarded += u64::from(class == PhotonClass::Direct);
                         return;
                     }
-                    bsdf = bsdf.specular_only();
+                    bsdf.keep_specular();
                 }
             }
             if depth >= max_depth {

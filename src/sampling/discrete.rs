@@ -3,7 +3,8 @@
 /// A distribution over `0..n`, proportional to given weights, sampled by bisection.
 #[derive(Clone, Debug, Default)]
 pub struct Discrete {
-    /// Cumulative weights, normalised to end at 1; empty if the total is zero.
+    /// Sums of the weights before each index and, last, of all, normalised to end at 1; empty if
+    /// the total is zero.
     cdf: Vec<f64>,
     /// One over each probability.
     inverse: Vec<f64>,
@@ -15,15 +16,13 @@ impl Discrete {
     /// count as zero.
     pub fn new(weights: impl IntoIterator<Item = f64>) -> Self {
         let mut sum = 0.0;
-        let mut cdf: Vec<f64> = weights
-            .into_iter()
-            .map(|w| {
-                if w.is_finite() && w > 0.0 {
-                    sum += w;
-                }
-                sum
-            })
-            .collect();
+        let mut cdf = vec![0.0];
+        cdf.extend(weights.into_iter().map(|w| {
+            if w.is_finite() && w > 0.0 {
+                sum += w;
+            }
+            sum
+        }));
         if sum > 0.0 && sum.is_finite() {
             for c in &mut cdf {
                 *c /= sum;
@@ -31,12 +30,9 @@ impl Discrete {
         } else {
             cdf.clear();
         }
-        let inverse = (0..cdf.len())
-            .map(|i| 1.0 / (cdf[i] - if i == 0 { 0.0 } else { cdf[i - 1] }))
-            .collect();
         Self {
+            inverse: cdf.windows(2).map(|c| 1.0 / (c[1] - c[0])).collect(),
             cdf,
-            inverse,
             total: sum,
         }
     }
@@ -54,29 +50,27 @@ impl Discrete {
     /// Probability of index `i`.
     #[inline]
     pub fn probability(&self, i: usize) -> f64 {
-        let lo = if i == 0 { 0.0 } else { self.cdf[i - 1] };
-        self.cdf[i] - lo
+        self.cdf[i + 1] - self.cdf[i]
     }
 
     /// Index chosen by `u` in `[0, 1)`, its probability, and `u` rescaled to `[0, 1)` within it.
     /// `None` for an empty distribution.
     #[inline]
     pub fn sample(&self, u: f64) -> Option<(usize, f64, f64)> {
-        match self.cdf.len() {
-            0 => return None,
-            1 => return Some((0, 1.0, u)),
-            _ => {}
+        let n = self.inverse.len();
+        if n <= 1 {
+            return (n == 1).then_some((0, 1.0, u));
         }
-        let i = if self.cdf.len() <= 8 {
+        let inner = &self.cdf[1..n];
+        let i = if n <= 8 {
             // Faster than bisection for the few entries of most scenes; counting all of them
             // leaves no branch to mispredict.
-            self.cdf.iter().map(|&c| usize::from(c <= u)).sum()
+            inner.iter().map(|&c| usize::from(c <= u)).sum()
         } else {
-            self.cdf.partition_point(|&c| c <= u)
-        }
-        .min(self.cdf.len() - 1);
-        let lo = if i == 0 { 0.0 } else { self.cdf[i - 1] };
-        let p = self.cdf[i] - lo;
+            inner.partition_point(|&c| c <= u)
+        };
+        let lo = self.cdf[i];
+        let p = self.cdf[i + 1] - lo;
         (p > 0.0).then(|| {
             (
                 i,

@@ -25,7 +25,7 @@ fn sin_cos_octant(x: f64) -> (f64, f64) {
 }
 
 /// Uniform point of the unit disc, by the concentric map of Shirley and Chiu (1997).
-#[inline]
+#[inline(always)]
 pub fn disc(u: [f64; 2]) -> [f64; 2] {
     let a = 2.0 * u[0] - 1.0;
     let b = 2.0 * u[1] - 1.0;

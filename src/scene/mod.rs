@@ -84,8 +84,15 @@ impl Scene {
         Surface::new(&self.geometry, sp, footprint)
     }
 
-    /// The scattering function at a surface point.
+    /// Completes the scattering function at a surface point, `bsdf` being new. (It is large, and
+    /// made where it stays: moving it would cost as much as all the rest.)
     #[inline]
+    pub fn scatter(&self, sp: &SurfacePoint, footprint: Option<Footprint>, bsdf: &mut Bsdf) {
+        self.material(sp.material)
+            .scatter(&self.surface(sp, footprint), bsdf);
+    }
+
+    /// The scattering function at a surface point, for those who are not in a hurry.
     pub fn bsdf(
         &self,
         sp: &SurfacePoint,
@@ -93,8 +100,7 @@ impl Scene {
         mode: TransportMode,
     ) -> Bsdf {
         let mut bsdf = Bsdf::new(sp, mode);
-        self.material(sp.material)
-            .scatter(&self.surface(sp, footprint), &mut bsdf);
+        self.scatter(sp, footprint, &mut bsdf);
         bsdf
     }
 
@@ -145,7 +151,7 @@ impl Scene {
     }
 
     /// As [`Geometry::surface_point`].
-    #[inline]
+    #[inline(always)]
     pub fn surface_point(&self, ray: &Ray, hit: &crate::geometry::Hit) -> SurfacePoint {
         self.geometry.surface_point(ray, hit)
     }

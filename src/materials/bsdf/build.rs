@@ -12,7 +12,7 @@ use crate::math::{DVec3, Frame};
 
 impl Bsdf {
     /// A surface that absorbs everything, until lobes are pushed.
-    #[inline]
+    #[inline(always)]
     pub fn new(sp: &SurfacePoint, mode: TransportMode) -> Self {
         let (ng, mut n) = if sp.front {
             (sp.ng, sp.n)

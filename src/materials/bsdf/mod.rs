@@ -7,10 +7,12 @@
 
 mod build;
 
+use std::ops::Mul;
+
 use arrayvec::ArrayVec;
 
 use super::cover::Cover;
-use super::lobes::{Lobe, LobeClass, LobeModel};
+use super::lobes::{Lambert, Lobe, LobeClass, LobeModel, LobeSample};
 use crate::color::Rgb;
 use crate::math::{DVec3, Frame};
 
@@ -46,6 +48,17 @@ pub struct BsdfValue {
     pub diffuse: Rgb,
     /// Of glossy lobes.
     pub glossy: Rgb,
+}
+
+impl Mul<Rgb> for BsdfValue {
+    type Output = Self;
+    #[inline]
+    fn mul(self, c: Rgb) -> Self {
+        Self {
+            diffuse: self.diffuse * c,
+            glossy: self.glossy * c,
+        }
+    }
 }
 
 /// Most lobes a material stacks.
@@ -159,6 +172,20 @@ impl Bsdf {
             .any(|e| e.lobe.class() != LobeClass::Delta)
     }
 
+    /// The one lobe of the commonest surface, which needs neither loop nor dispatch.
+    #[inline(always)]
+    fn lone_lambert(&self) -> Option<&Lambert> {
+        match self.lobes.as_slice() {
+            [
+                Entry {
+                    lobe: Lobe::Lambert(lobe),
+                    ..
+                },
+            ] if self.covers.is_empty() => Some(lobe),
+            _ => None,
+        }
+    }
+
     /// The albedo if the surface is one Lambert lobe and nothing else.
     #[inline]
     pub fn as_lambert(&self) -> Option<Rgb> {
@@ -201,23 +228,21 @@ impl Bsdf {
         diffuse.map(|e| e.pick).sum::<f64>() / self.total
     }
 
-    /// The same point with only its diffuse lobes.
+    /// Drops all lobes that are not diffuse.
     #[inline]
-    pub fn diffuse_only(&self) -> Self {
-        self.filtered(|c| c == LobeClass::Diffuse)
+    pub fn keep_diffuse(&mut self) {
+        self.keep(|c| c == LobeClass::Diffuse);
     }
 
-    /// The same point without its diffuse lobes.
+    /// Drops the diffuse lobes.
     #[inline]
-    pub fn specular_only(&self) -> Self {
-        self.filtered(|c| c != LobeClass::Diffuse)
+    pub fn keep_specular(&mut self) {
+        self.keep(|c| c != LobeClass::Diffuse);
     }
 
-    fn filtered(&self, keep: impl Fn(LobeClass) -> bool) -> Self {
-        let mut out = self.clone();
-        out.lobes.retain(|e| keep(e.lobe.class()));
-        out.total = out.lobes.iter().map(|e| e.pick).sum();
-        out
+    fn keep(&mut self, keep: impl Fn(LobeClass) -> bool) {
+        self.lobes.retain(|e| keep(e.lobe.class()));
+        self.total = self.lobes.iter().map(|e| e.pick).sum();
     }
 
     /// The factor that makes `f` adjoint: η² for refracted radiance, and the correction for
@@ -251,24 +276,23 @@ impl Bsdf {
     /// `weight(pdf of that lobe)`; the pdf includes the probability of picking the lobe.
     #[inline(always)]
     pub fn eval(&self, wi: DVec3, weight: impl Fn(f64) -> f64) -> BsdfValue {
+        let Some(lobe) = self.lone_lambert() else {
+            return self.eval_stack(wi, weight);
+        };
         let mut out = BsdfValue::default();
         let main = self.main.frame.to_local(wi);
-        // By far the commonest surface needs neither loop nor dispatch.
-        if let [
-            Entry {
-                lobe: Lobe::Lambert(lobe),
-                ..
-            },
-        ] = self.lobes.as_slice()
-            && self.covers.is_empty()
-        {
-            if self.sides_agree(wi, main) {
-                let (f, pdf) = lobe.eval(self.main.wo, main);
-                let factor = self.transport_factor(self.main.wo, wi, main, 1.0);
-                out.diffuse = f * (main.z * factor * weight(pdf));
-            }
-            return out;
+        if self.sides_agree(wi, main) {
+            let (f, pdf) = lobe.eval(self.main.wo, main);
+            let factor = self.transport_factor(self.main.wo, wi, main, 1.0);
+            out.diffuse = f * (main.z * factor * weight(pdf));
         }
+        out
+    }
+
+    #[inline(never)]
+    fn eval_stack(&self, wi: DVec3, weight: impl Fn(f64) -> f64) -> BsdfValue {
+        let mut out = BsdfValue::default();
+        let main = self.main.frame.to_local(wi);
         for e in &self.lobes {
             let class = e.lobe.class();
             if class == LobeClass::Delta {
@@ -354,8 +378,19 @@ impl Bsdf {
     }
 
     /// Picks a lobe by `u_lobe` and a direction from it by `u`. `None` where nothing scatters.
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, u_lobe: f64, u: [f64; 2]) -> Option<BsdfSample> {
+        match self.lone_lambert() {
+            Some(lobe) => {
+                let s = lobe.sample(self.main.wo, u_lobe, u)?;
+                self.scattered(&self.main, &s, LobeClass::Diffuse, 1.0, 1.0)
+            }
+            None => self.sample_stack(u_lobe, u),
+        }
+    }
+
+    #[inline(never)]
+    fn sample_stack(&self, u_lobe: f64, u: [f64; 2]) -> Option<BsdfSample> {
         let (last, firsts) = self.lobes.split_last()?;
         let (mut chosen, mut p_lobe, mut u_in) = (last, 1.0, u_lobe);
         if !firsts.is_empty() {
@@ -374,14 +409,26 @@ impl Bsdf {
         let lobe = &chosen.lobe;
         let view = self.view(chosen.frame);
         let s = lobe.sample(view.wo, u_in, u)?;
+        let mut out = self.scattered(view, &s, lobe.class(), lobe.eta(), p_lobe)?;
+        out.weight *= self.uncovered(chosen.under, out.wi);
+        Some(out)
+    }
+
+    /// The sample `s` of a lobe that was picked with probability `p_lobe`, in the world.
+    #[inline(always)]
+    fn scattered(
+        &self,
+        view: &View,
+        s: &LobeSample,
+        class: LobeClass,
+        eta: f64,
+        p_lobe: f64,
+    ) -> Option<BsdfSample> {
         let wi = view.frame.to_world(s.wi);
         if !self.sides_agree(wi, s.wi) {
             return None;
         }
-        let mut factor = self.transport_factor(view.wo, wi, s.wi, lobe.eta());
-        if !self.covers.is_empty() {
-            factor *= self.uncovered(chosen.under, wi);
-        }
+        let factor = self.transport_factor(view.wo, wi, s.wi, eta);
         Some(BsdfSample {
             wi,
             weight: if p_lobe == 1.0 {
@@ -390,7 +437,7 @@ impl Bsdf {
                 s.weight * (factor / p_lobe)
             },
             pdf: s.pdf * p_lobe,
-            class: lobe.class(),
+            class,
             transmitted: s.wi.z < 0.0,
         })
     }
