@@ -130,6 +130,8 @@ pub fn scene(registry: &Registry) -> dualight::error::Result<Scene> {
         world_from_camera: DAffine3::from_translation(DVec3::new(0.0, 1.0, 5.0)),
         vertical: 35f64.to_radians(),
         aspect: None,
+        shift: [0.0; 2],
+        lens: None,
     });
     b.finish()
 }

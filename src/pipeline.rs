@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::cameras::framing;
+use crate::cameras::{framing, with_lens};
 use crate::control::{Control, Stopped};
 use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
@@ -252,7 +252,9 @@ pub fn choose_camera(
             })?,
     };
     let entry = registry.cameras.find(desc.kind)?;
-    (entry.build)(desc, aspect).map_err(|e| Error::Usage(format!("camera '{}': {e}", desc.name)))
+    (entry.build)(desc, aspect)
+        .and_then(|camera| with_lens(camera, desc))
+        .map_err(|e| Error::Usage(format!("camera '{}': {e}", desc.name)))
 }
 
 fn region(settings: &RenderSettings) -> Result<Region> {

@@ -91,7 +91,7 @@ fn compare(scene: &Scene, camera: &dyn Camera, kind: Kind, tolerance: f64) -> Ve
         for i in (3..PIXELS).step_by(13) {
             let (x, y) = (f64::from(i) + 0.5, f64::from(j) + 0.5);
             let at = |x, y| {
-                let r = spacing.camera_ray(camera, x, y, true);
+                let r = spacing.camera_ray(camera, x, y, [0.5; 2], true);
                 (trace(scene, &*accel, r.ray, kind), r.differential.unwrap())
             };
             let (path, start) = at(x, y);

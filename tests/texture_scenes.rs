@@ -162,6 +162,9 @@ fn textures_of_real_files_are_decoded() {
         ),
     ];
     for (file, sizes) in cases {
+        if file.contains("KTX") && cfg!(not(feature = "ktx2")) {
+            continue;
+        }
         let path = root.join(&file);
         if !path.exists() {
             eprintln!("{file} is not at hand");

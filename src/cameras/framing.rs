@@ -28,6 +28,8 @@ pub fn framing(scene: &BoundingSphere, aspect: f64) -> CameraDesc {
         world_from_camera: DAffine3::from_cols(x, toward.cross(x), toward, eye),
         vertical,
         aspect: None,
+        shift: [0.0; 2],
+        lens: None,
     }
 }
 
@@ -47,7 +49,7 @@ mod tests {
             let camera = (kind.build)(&framing(&ball, aspect), aspect).unwrap();
             // Distance of the rays through the edges' middles from the centre.
             let miss = |x, y| {
-                let (o, d) = camera.ray(x, y);
+                let (o, d) = camera.ray(x, y, [0.5; 2]);
                 (ball.center - o).cross(d).length()
             };
             let edges = [miss(0.0, 0.5), miss(0.5, 0.0)];

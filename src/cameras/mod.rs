@@ -1,10 +1,12 @@
 //! Cameras: rays for points of the image. A camera kind is one file and one line in [`CAMERAS`].
 
 mod framing;
+mod lens;
 mod orthographic;
 mod perspective;
 
 pub use framing::framing;
+pub use lens::{Lens, with_lens};
 
 use crate::math::{DAffine3, DVec3};
 
@@ -21,13 +23,22 @@ pub struct CameraDesc {
     pub vertical: f64,
     /// Width over height that the file asks for, if it does.
     pub aspect: Option<f64>,
+    /// How far the image is moved right and up, in parts of its width and height.
+    pub shift: [f64; 2],
+    /// The lens; a pinhole if there is none.
+    pub lens: Option<Lens>,
 }
 
 /// A camera for images of a given aspect ratio.
 pub trait Camera: Send + Sync {
     /// Origin and unit direction of the ray through the image point `(x, y)`, both in `0..1`,
-    /// `y` downward. World space.
-    fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3);
+    /// `y` downward. World space. `lens` chooses a point of the lens, for cameras that have one.
+    fn ray(&self, x: f64, y: f64, lens: [f64; 2]) -> (DVec3, DVec3);
+
+    /// Whether `lens` makes a difference to [`ray`](Self::ray).
+    fn has_lens(&self) -> bool {
+        false
+    }
 }
 
 /// A camera kind that can be chosen.

@@ -8,12 +8,15 @@ struct Orthographic {
     right: DVec3,
     up: DVec3,
     forward: DVec3,
+    /// In parts of the half sizes.
+    shift: [f64; 2],
 }
 
 impl Camera for Orthographic {
     #[inline]
-    fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
-        let o = self.origin + self.right * (2.0 * x - 1.0) + self.up * (1.0 - 2.0 * y);
+    fn ray(&self, x: f64, y: f64, _lens: [f64; 2]) -> (DVec3, DVec3) {
+        let [sx, sy] = self.shift;
+        let o = self.origin + self.right * (2.0 * x - 1.0 + sx) + self.up * (1.0 - 2.0 * y + sy);
         (o, self.forward)
     }
 }
@@ -32,6 +35,7 @@ fn build(d: &CameraDesc, aspect: f64) -> Result<Box<dyn Camera>, String> {
         right: axis(m.x_axis)? * (d.vertical * aspect),
         up: axis(m.y_axis)? * d.vertical,
         forward: -axis(m.z_axis)?,
+        shift: d.shift.map(|s| 2.0 * s),
     }))
 }
 

@@ -7,12 +7,15 @@ struct Perspective {
     origin: DVec3,
     /// Columns: right and up scaled by the half sizes of the image at distance one, and forward.
     basis: DMat3,
+    /// In parts of the half sizes.
+    shift: [f64; 2],
 }
 
 impl Camera for Perspective {
     #[inline]
-    fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
-        let d = self.basis * DVec3::new(2.0 * x - 1.0, 1.0 - 2.0 * y, 1.0);
+    fn ray(&self, x: f64, y: f64, _lens: [f64; 2]) -> (DVec3, DVec3) {
+        let [sx, sy] = self.shift;
+        let d = self.basis * DVec3::new(2.0 * x - 1.0 + sx, 1.0 - 2.0 * y + sy, 1.0);
         (self.origin, d.normalize())
     }
 }
@@ -34,6 +37,7 @@ fn build(d: &CameraDesc, aspect: f64) -> Result<Box<dyn Camera>, String> {
             axis(m.y_axis)? * h,
             -axis(m.z_axis)?,
         ),
+        shift: d.shift.map(|s| 2.0 * s),
     }))
 }
 

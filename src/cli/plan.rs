@@ -170,6 +170,7 @@ pub fn import_options(args: &SceneArgs) -> ImportOptions {
             },
             strength: args.environment_strength,
             rotation: args.environment_rotation.to_radians(),
+            seen_by_camera: true,
         }),
     }
 }

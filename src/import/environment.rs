@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use image::{ImageDecoder, ImageReader, Limits};
 
+use super::json::Cursor;
+use super::{Notes, Problem, extras};
 use crate::color::Rgb;
 use crate::error::{Error, Result};
 use crate::lights::{LightDesc, SkyImage};
@@ -22,6 +24,8 @@ pub struct EnvironmentOption {
     pub strength: f64,
     /// Its turn about the vertical axis in radians, counter-clockwise seen from above.
     pub rotation: f64,
+    /// Whether camera rays see it.
+    pub seen_by_camera: bool,
 }
 
 /// What an environment shows.
@@ -54,9 +58,39 @@ impl EnvironmentOption {
             strength: strength * self.strength,
             sky,
             rotation: DQuat::from_axis_angle(DVec3::Y, self.rotation),
+            seen_by_camera: self.seen_by_camera,
             ..Default::default()
         })
     }
+}
+
+/// The environment that the extras of the glTF scene `scene` describe, if they do; images are
+/// looked for beside the file `path`.
+pub(super) fn of_scene(
+    scene: &Cursor<'_>,
+    path: &Path,
+    notes: &mut Notes,
+) -> Result<Option<EnvironmentOption>, Problem> {
+    let ours = extras::of(scene, &["environment"], notes)?;
+    let Some(e) = ours.and_then(|o| o.get("environment")) else {
+        return Ok(None);
+    };
+    let names = ["color", "image", "strength", "rotation", "seen_by_camera"];
+    extras::check(&e, &names, notes)?;
+    let source = match (e.get("image"), extras::color(&e, "color")?) {
+        (Some(image), None) => {
+            let beside = path.parent().unwrap_or(Path::new(""));
+            EnvironmentSource::Image(beside.join(image.str()?))
+        }
+        (None, Some(color)) => EnvironmentSource::Color(color),
+        _ => return Err(e.problem("has not exactly one of 'image' and 'color'")),
+    };
+    Ok(Some(EnvironmentOption {
+        source,
+        strength: extras::number(&e, "strength", 0.0..=1e30, "a factor from 0")?.unwrap_or(1.0),
+        rotation: e.number_or("rotation", 0.0)?,
+        seen_by_camera: extras::flag(&e, "seen_by_camera")?.unwrap_or(true),
+    }))
 }
 
 fn broken(path: &Path, problem: impl ToString) -> Error {

@@ -1,12 +1,24 @@
-//! Lights (`KHR_lights_punctual`).
+//! Lights (`KHR_lights_punctual`), and what our extras say about their extent.
 
-use super::Problem;
+use std::f64::consts::{FRAC_PI_4, PI};
+
 use super::json::Cursor;
 use super::node::Walker;
+use super::{Notes, Problem, extras};
 use crate::color::Rgb;
 use crate::color::units::{self, LightUnits};
 use crate::lights::{LightDesc, SpotCurve};
 use crate::math::{DAffine3, DVec3};
+
+/// What our extras say about a punctual light.
+#[derive(Default)]
+struct Extent {
+    /// Of a point or spot.
+    radius: f64,
+    /// Under which a sun is seen, from rim to rim.
+    angle: f64,
+    seen_by_camera: bool,
+}
 
 /// Whether the file was written by Blender's own exporter.
 pub(super) fn from_blender(root: &Cursor<'_>) -> bool {
@@ -50,16 +62,38 @@ pub(super) fn read(
             return Err(kind.problem(text));
         }
     };
+    let names: &[&str] = if kind == "directional" {
+        &["angle", "seen_by_camera"]
+    } else {
+        &["radius", "seen_by_camera"]
+    };
+    let ours = extras::of(light, names, walker.notes)?;
+    let mut extent = Extent::default();
+    if let Some(ours) = &ours {
+        extent = Extent {
+            radius: extras::number(ours, "radius", 0.0..=1e15, "a length in metres from 0")?
+                .unwrap_or(0.0),
+            angle: extras::number(ours, "angle", 0.0..PI, "an angle in radians from 0 to π")?
+                .unwrap_or(0.0),
+            seen_by_camera: extras::flag(ours, "seen_by_camera")?.unwrap_or(false),
+        };
+    }
     let blender = walker.light_units == LightUnits::Blender;
     let color: [f64; 3] = light.numbers_or("color", [1.0; 3])?;
-    let scale =
+    let mut scale =
         light.number_or("intensity", 1.0)?.max(0.0) * units::radiometric_factor(walker.light_units);
     let spot = light.get("spot");
     let angle = |key: &str, default: f64| match &spot {
         Some(s) => s.number_or(key, default),
         None => Ok(default),
     };
-    let outer = angle("outerConeAngle", std::f64::consts::FRAC_PI_4)?;
+    let outer = angle("outerConeAngle", FRAC_PI_4)?.clamp(0.0, PI);
+    if kind == "spot" && outer == 0.0 {
+        walker
+            .notes
+            .add("spot lights whose cone is closed shine nowhere", 1);
+        scale = 0.0;
+    }
     let range = match light.get("range") {
         // In Blender the custom distance is for its rasteriser alone; Cycles takes no heed of it.
         Some(_) if blender => f64::INFINITY,
@@ -77,14 +111,81 @@ pub(super) fn read(
             .transform_vector3(DVec3::NEG_Z)
             .normalize_or(DVec3::NEG_Z),
         strength: Rgb::new(color[0], color[1], color[2]).map(|c| c.max(0.0)) * scale,
-        inner_cone: angle("innerConeAngle", 0.0)?.clamp(0.0, outer.max(0.0)),
-        outer_cone: outer.clamp(0.0, std::f64::consts::PI),
+        inner_cone: angle("innerConeAngle", 0.0)?.clamp(0.0, outer),
+        outer_cone: outer,
         spot_curve: if blender {
             SpotCurve::Cycles
         } else {
             SpotCurve::Gltf
         },
         range,
+        radius: extent.radius,
+        angular_radius: 0.5 * extent.angle,
+        seen_by_camera: extent.seen_by_camera,
         ..Default::default()
     })
+}
+
+/// Reads the area light that the extras of a node describe, if they do.
+pub(super) fn area(
+    node: &Cursor<'_>,
+    name: &str,
+    world: DAffine3,
+    notes: &mut Notes,
+) -> Result<Option<LightDesc>, Problem> {
+    let ours = extras::of(node, &["area_light"], notes)?;
+    let Some(area) = ours.and_then(|o| o.get("area_light")) else {
+        return Ok(None);
+    };
+    let names = ["shape", "size", "power", "color", "seen_by_camera"];
+    extras::check(&area, &names, notes)?;
+    let shape = area.need("shape")?;
+    let (round, square) = match shape.str()? {
+        "square" => (false, true),
+        "rectangle" => (false, false),
+        "disk" => (true, true),
+        "ellipse" => (true, false),
+        other => {
+            let text = format!("'{other}' is neither square, rectangle, disk nor ellipse");
+            return Err(shape.problem(text));
+        }
+    };
+    let missing = || area.problem("'size' is missing");
+    let [width, height] = if square {
+        [extras::length(&area, "size")?.ok_or_else(missing)?; 2]
+    } else {
+        let at = area.need("size")?;
+        let size: [f64; 2] = area.numbers_or("size", [0.0; 2])?;
+        if !size.iter().all(|x| *x > 0.0) {
+            return Err(at.problem("is not a width and a height in metres above 0"));
+        }
+        size
+    };
+    let power = extras::number(&area, "power", 0.0..=1e30, "a power in watts from 0")?
+        .ok_or_else(|| area.problem("'power' is missing"))?;
+    let color = extras::color(&area, "color")?.unwrap_or([1.0; 3]);
+    let edges = [
+        world.transform_vector3(DVec3::X * width),
+        world.transform_vector3(DVec3::Y * height),
+    ];
+    let surface = edges[0].cross(edges[1]).length() * if round { FRAC_PI_4 } else { 1.0 };
+    // Lambertian emission from one side: P = π A L.
+    let radiance = power / (PI * surface);
+    if !radiance.is_finite() {
+        notes.add("area lights without area are left out", 1);
+        return Ok(None);
+    }
+    Ok(Some(LightDesc {
+        kind: "panel",
+        name: name.to_owned(),
+        position: world.translation,
+        direction: world
+            .transform_vector3(DVec3::NEG_Z)
+            .normalize_or(DVec3::NEG_Z),
+        strength: Rgb::new(color[0], color[1], color[2]) * radiance,
+        edges,
+        round,
+        seen_by_camera: extras::flag(&area, "seen_by_camera")?.unwrap_or(false),
+        ..Default::default()
+    }))
 }

@@ -12,6 +12,7 @@ mod container;
 #[cfg(feature = "draco")]
 mod draco;
 mod environment;
+mod extras;
 mod hierarchy;
 mod image;
 mod implicit;
@@ -203,10 +204,11 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
     let root = Cursor::root(&document.json);
     let source = Source::new(root.clone(), &document.buffers, document.size);
     let mut images = Images::new(&source, path);
-    fill(
+    let own = fill(
         &root,
         &source,
         &mut images,
+        path,
         options,
         &mut builder,
         &mut notes,
@@ -218,7 +220,7 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
             other => other,
         },
     })?;
-    if let Some(environment) = &options.environment {
+    if let Some(environment) = options.environment.as_ref().or(own.as_ref()) {
         builder.add_light(environment.light()?);
     }
     for (what, n) in notes.0 {
@@ -260,21 +262,24 @@ impl From<Problem> for Failure {
     }
 }
 
+/// Fills the scene; gives back the environment that the file itself asks for.
 fn fill<'a>(
     root: &Cursor<'a>,
     source: &Source<'a>,
     images: &mut Images<'a>,
+    path: &Path,
     options: &ImportOptions,
     builder: &mut SceneBuilder,
     notes: &mut Notes,
-) -> Result<(), Failure> {
+) -> Result<Option<EnvironmentOption>, Failure> {
     let animations = root.items("animations")?.len();
     if animations > 0 && options.time.is_none() {
         builder.inform("animations are at rest; --time or --frame shows them at a moment");
     }
     let pose = animation::pose(source, options, notes)?;
     let variant = variants::choose(root, options.variant.as_deref())?;
-    let roots = roots(root, options)?;
+    let scene = chosen_scene(root, options)?;
+    let roots = scene.items("nodes")?;
     let used = used::materials(root, &roots)?;
     let entries = root.items("materials")?;
     for (_, m) in entries.iter().enumerate().filter(|(i, _)| used.contains(i)) {
@@ -317,7 +322,7 @@ fn fill<'a>(
         notes,
     };
     walker.walk(&roots)?;
-    Ok(())
+    Ok(environment::of_scene(&scene, path, notes)?)
 }
 
 fn check_extensions(root: &Cursor<'_>, notes: &mut Notes) -> Result<(), Problem> {
@@ -340,13 +345,13 @@ fn check_extensions(root: &Cursor<'_>, notes: &mut Notes) -> Result<(), Problem>
     Ok(())
 }
 
-/// The root nodes of the chosen scene, as references.
-fn roots<'a>(root: &Cursor<'a>, options: &ImportOptions) -> Result<Vec<Cursor<'a>>, Problem> {
+/// The scene that is rendered.
+fn chosen_scene<'a>(root: &Cursor<'a>, options: &ImportOptions) -> Result<Cursor<'a>, Problem> {
     let scenes = root.items("scenes")?;
     let chosen = match &options.scene {
         Some(name) => {
             let named = |s: &&Cursor<'_>| s.get("name").is_some_and(|n| n.value() == name.as_str());
-            Some(scenes.iter().find(named).ok_or_else(|| {
+            Some(scenes.iter().find(named).cloned().ok_or_else(|| {
                 let known: Vec<String> = scenes.iter().map(Cursor::name).collect();
                 Problem {
                     remedy: format!("known scenes: {}", known.join(", ")),
@@ -358,16 +363,14 @@ fn roots<'a>(root: &Cursor<'a>, options: &ImportOptions) -> Result<Vec<Cursor<'a
             Some(at) => Some(
                 scenes
                     .get(at.index()?)
+                    .cloned()
                     .ok_or_else(|| at.problem("names a scene that does not exist"))?,
             ),
-            None => scenes.first(),
+            None => scenes.first().cloned(),
         },
     };
-    match chosen {
-        Some(scene) => scene.items("nodes"),
-        None => Err(Problem {
-            remedy: "export the file with a scene".into(),
-            ..Problem::invalid("/scenes", "the file holds no scene")
-        }),
-    }
+    chosen.ok_or_else(|| Problem {
+        remedy: "export the file with a scene".into(),
+        ..Problem::invalid("/scenes", "the file holds no scene")
+    })
 }

@@ -150,7 +150,7 @@ impl<'a> Walker<'a, '_> {
     fn camera(&mut self, node: &Cursor<'a>, world: DAffine3) -> Result<(), Problem> {
         if let Some(at) = node.get("camera") {
             let camera = self.source.root.element("cameras", at.index()?, &at)?;
-            let desc = camera::read(&camera, node.name(), world)?;
+            let desc = camera::read(&camera, node.name(), world, self.notes)?;
             self.builder.add_camera(desc);
         }
         Ok(())
@@ -162,6 +162,9 @@ impl<'a> Walker<'a, '_> {
             .and_then(|e| e.get("light"))
         {
             let desc = light::read(self, &at, node.name(), world)?;
+            self.builder.add_light(desc);
+        }
+        if let Some(desc) = light::area(node, &node.name(), world, self.notes)? {
             self.builder.add_light(desc);
         }
         Ok(())

@@ -94,8 +94,13 @@ pub fn camera_pass(
                             let mut sampler = Sampler::new(seed, stream::CAMERA, key, u64::from(s));
                             let [jx, jy] = sampler.next_2d();
                             let (x, y) = (f64::from(px) + jx, f64::from(py) + jy);
+                            let lens = if camera.has_lens() {
+                                sampler.next_2d()
+                            } else {
+                                [0.5; 2]
+                            };
                             batch.push(Sample {
-                                camera: spacing.camera_ray(camera, x, y, differentials),
+                                camera: spacing.camera_ray(camera, x, y, lens, differentials),
                                 sampler,
                                 pixel,
                             });

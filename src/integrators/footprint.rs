@@ -32,9 +32,16 @@ impl Spacing {
     /// The camera's ray through the image point `(x, y)` in pixels, with its differential. It is
     /// the difference of the rays half a pixel to either side, so that any camera will do; a
     /// camera maps pixels so smoothly that nothing is lost.
-    pub fn camera_ray(&self, camera: &dyn Camera, x: f64, y: f64, differential: bool) -> CameraRay {
+    pub fn camera_ray(
+        &self,
+        camera: &dyn Camera,
+        x: f64,
+        y: f64,
+        lens: [f64; 2],
+        differential: bool,
+    ) -> CameraRay {
         let [w, h] = self.image;
-        let at = |x: f64, y: f64| camera.ray(x / w, y / h);
+        let at = |x: f64, y: f64| camera.ray(x / w, y / h, lens);
         let (o, d) = at(x, y);
         let difference = |dx: f64, dy: f64| {
             let (a, b) = (at(x - dx, y - dy), at(x + dx, y + dy));

@@ -4,7 +4,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::footprint::Trail;
-use super::light_sampling::{escaped, power_heuristic, sample_direct};
+use super::light_sampling::{View, power_heuristic, sample_direct};
 use super::photon::{CHAIN_GUARD, PhotonMapping, ROULETTE_DEPTH};
 use super::stored_light::{Stored, sites};
 use super::{CameraRay, Scratch};
@@ -26,6 +26,8 @@ const NEAR_STEPS: u32 = 3;
 enum Seen<'a> {
     /// A light.
     Light(&'a SurfacePoint, Option<Footprint>),
+    /// Perhaps lights that it passes through, within some metres.
+    Between(&'a Ray, f64),
     /// Nothing: the ray leaves the scene.
     Sky(&'a Ray),
 }
@@ -134,15 +136,22 @@ impl PhotonMapping<'_> {
             scratch.rays.gather += 1;
             let shadow = f64::from(n_shadow);
             let mut seen = Rgb::ZERO;
+            let view = View {
+                camera: false,
+                last: Some((s.pdf, sp.p)),
+                n_bsdf: n_gather,
+                n_light: shadow,
+            };
             let reflected = self.gather(start, s.weight, sampler, scratch, 0, |on, beta| {
-                seen = beta
+                seen += beta
                     * match on {
                         Seen::Light(on, footprint) => {
                             let pdf_light = cx.scene.pdf_light(sp.p, on);
                             cx.scene.emitted(on, footprint)
                                 * power_heuristic(n_gather, s.pdf, shadow, pdf_light)
                         }
-                        Seen::Sky(ray) => escaped(cx, ray, Some((s.pdf, sp.p)), n_gather, shadow),
+                        Seen::Sky(ray) => view.escaped(cx, ray),
+                        Seen::Between(ray, reach) => view.crossed(cx, ray, reach),
                     };
             });
             light.direct += seen * share;
@@ -176,6 +185,9 @@ impl PhotonMapping<'_> {
                 return Rgb::ZERO;
             };
             let sp = cx.scene.surface_point(&ray, &hit);
+            if depth == 0 && !cx.scene.bodiless().is_empty() {
+                on_light(Seen::Between(&ray, sp.distance), beta);
+            }
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }

@@ -2,7 +2,7 @@
 
 use super::RenderContext;
 use crate::color::Rgb;
-use crate::geometry::{Ray, SurfacePoint};
+use crate::geometry::{LightId, Ray, SurfacePoint};
 use crate::materials::{Bsdf, BsdfValue};
 use crate::math::DVec3;
 
@@ -21,34 +21,80 @@ pub(super) fn power_heuristic(na: f64, a: f64, nb: f64, b: f64) -> f64 {
     }
 }
 
-/// Radiance that a ray which leaves the scene sees. `last` is density and origin of the sample
-/// of the BSDF that chose it, none if no light sampling could have found the light; `n_bsdf` such
-/// samples are taken against `n_light` of lights.
-pub(super) fn escaped(
-    cx: &RenderContext<'_>,
-    ray: &Ray,
-    last: Option<(f64, DVec3)>,
-    n_bsdf: f64,
-    n_light: f64,
-) -> Rgb {
-    if cx.scene.infinite().is_empty() {
-        return Rgb::ZERO;
-    }
-    let dir = ray.direction().normalize_or_zero();
-    let mut sum = Rgb::ZERO;
-    for &id in cx.scene.infinite() {
-        let light = cx.scene.light(id);
-        let radiance = light.escaped(dir);
-        if radiance.is_black() {
-            continue;
+/// What a ray may see of lights that are no surfaces of the scene.
+#[derive(Clone, Copy)]
+pub(super) struct View {
+    /// Whether it is a camera ray.
+    pub(super) camera: bool,
+    /// Density and origin of the sample of the BSDF that chose the ray; none if no light sampling
+    /// could have found the light.
+    pub(super) last: Option<(f64, DVec3)>,
+    /// Such samples of the BSDF, taken against…
+    pub(super) n_bsdf: f64,
+    /// …those of lights.
+    pub(super) n_light: f64,
+}
+
+impl View {
+    /// Of a ray of a path; `depth` counts its bounces so far.
+    #[inline]
+    pub(super) fn of_path(depth: u32, last: Option<(f64, DVec3)>) -> Self {
+        Self {
+            camera: depth == 0,
+            last,
+            n_bsdf: 1.0,
+            n_light: 1.0,
         }
-        let weight = last.map_or(1.0, |(pdf, from)| {
-            let pdf_light = light.pdf_escaped(dir) * cx.scene.light_probability(from, id);
-            power_heuristic(n_bsdf, pdf, n_light, pdf_light)
-        });
-        sum += radiance * weight;
     }
-    sum
+
+    /// Share of the radiance that this ray counts of a light that light sampling finds with
+    /// density `pdf`.
+    fn weight(&self, cx: &RenderContext<'_>, id: LightId, pdf: f64) -> f64 {
+        self.last.map_or(1.0, |(pdf_bsdf, from)| {
+            let pdf_light = pdf * cx.scene.light_probability(from, id);
+            power_heuristic(self.n_bsdf, pdf_bsdf, self.n_light, pdf_light)
+        })
+    }
+
+    /// Radiance of the lights that `ray` passes through within `reach` metres.
+    #[inline]
+    pub(super) fn crossed(&self, cx: &RenderContext<'_>, ray: &Ray, reach: f64) -> Rgb {
+        if cx.scene.bodiless().is_empty() {
+            return Rgb::ZERO;
+        }
+        let dir = ray.direction().normalize_or_zero();
+        let mut sum = Rgb::ZERO;
+        for &id in cx.scene.bodiless() {
+            let light = cx.scene.light(id);
+            if self.camera && !light.seen_by_camera() {
+                continue;
+            }
+            if let Some(c) = light.crossed(ray.origin(), dir, reach) {
+                sum += c.radiance * self.weight(cx, id, c.pdf);
+            }
+        }
+        sum
+    }
+
+    /// Radiance that a ray which leaves the scene sees, near and at infinity.
+    pub(super) fn escaped(&self, cx: &RenderContext<'_>, ray: &Ray) -> Rgb {
+        let mut sum = self.crossed(cx, ray, f64::INFINITY);
+        if cx.scene.infinite().is_empty() {
+            return sum;
+        }
+        let dir = ray.direction().normalize_or_zero();
+        for &id in cx.scene.infinite() {
+            let light = cx.scene.light(id);
+            if self.camera && !(cx.settings.background && light.seen_by_camera()) {
+                continue;
+            }
+            let radiance = light.escaped(dir);
+            if !radiance.is_black() {
+                sum += radiance * self.weight(cx, id, light.pdf_escaped(dir));
+            }
+        }
+        sum
+    }
 }
 
 /// A light's contribution at a point, and the ray that must reach it.

@@ -6,7 +6,7 @@
 use arrayvec::ArrayVec;
 
 use super::footprint::Trail;
-use super::light_sampling::{escaped, power_heuristic, sample_direct};
+use super::light_sampling::{View, power_heuristic, sample_direct};
 use super::{BATCH, Integrator, IntegratorEntry, RenderContext, Sample, Scratch};
 use crate::color::Rgb;
 use crate::film::{Component, PixelSample};
@@ -165,11 +165,8 @@ impl Path<'_> {
 
     /// Takes the light from beyond the scene that a path has met.
     fn escape(&self, depth: u32, w: &Walker, out: &mut PixelSample) {
-        let cx = &self.cx;
-        if depth > 0 || cx.settings.background {
-            let radiance = escaped(cx, &w.ray, w.last, 1.0, 1.0);
-            out.add(w.walk.component(), w.beta * radiance);
-        }
+        let radiance = View::of_path(depth, w.last).escaped(&self.cx, &w.ray);
+        out.add(w.walk.component(), w.beta * radiance);
     }
 
     /// What happens where a path has met a surface: takes the light that is found there to the
@@ -185,6 +182,10 @@ impl Path<'_> {
         lights: &mut ArrayVec<Direct, BATCH>,
     ) -> bool {
         let cx = &self.cx;
+        if !cx.scene.bodiless().is_empty() {
+            let seen = View::of_path(depth, w.last).crossed(cx, &w.ray, sp.distance);
+            out.add(w.walk.component(), w.beta * seen);
+        }
         if let Some(t) = cx.scene.transmittance(sp) {
             w.beta *= t;
         }

@@ -12,7 +12,7 @@
 //! by way of specular surfaces is left to the caustic map.
 
 use super::footprint::Trail;
-use super::light_sampling::{escaped, power_heuristic, sample_direct};
+use super::light_sampling::{View, power_heuristic, sample_direct};
 use super::{Integrator, IntegratorEntry, RenderContext, Sample, Scratch};
 use arrayvec::ArrayVec;
 
@@ -105,18 +105,19 @@ impl PhotonMapping<'_> {
             mut last,
         } = chain;
         for depth in start.. {
+            // Of what is seen along this ray.
+            let component = if depth == 0 {
+                Component::Direct
+            } else {
+                Component::Specular
+            };
+            let view = View::of_path(depth, last);
             let Some(hit) = cx.accel.intersect(&ray) else {
-                if depth > 0 || cx.settings.background {
-                    let component = if depth == 0 {
-                        Component::Direct
-                    } else {
-                        Component::Specular
-                    };
-                    out.add(component, beta * escaped(cx, &ray, last, 1.0, 1.0));
-                }
+                out.add(component, beta * view.escaped(cx, &ray));
                 return;
             };
             let sp = cx.scene.surface_point(&ray, &hit);
+            out.add(component, beta * view.crossed(cx, &ray, sp.distance));
             if let Some(t) = cx.scene.transmittance(&sp) {
                 beta *= t;
             }
@@ -134,22 +135,12 @@ impl PhotonMapping<'_> {
                 let weight = last.map_or(1.0, |(pdf, from)| {
                     power_heuristic(1.0, pdf, 1.0, cx.scene.pdf_light(from, &sp))
                 });
-                let component = if depth == 0 {
-                    Component::Direct
-                } else {
-                    Component::Specular
-                };
                 out.add(
                     component,
                     beta * cx.scene.emitted(&sp, trail.footprint()) * weight,
                 );
             }
             if let Some(color) = bsdf.shown() {
-                let component = if depth == 0 {
-                    Component::Direct
-                } else {
-                    Component::Specular
-                };
                 out.add(component, beta * color);
                 return;
             }

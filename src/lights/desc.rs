@@ -17,9 +17,9 @@ pub struct LightDesc {
     pub kind: &'static str,
     /// Name of the node, for messages.
     pub name: String,
-    /// Position of point and spot lights.
+    /// Position of point and spot lights, middle of panels.
     pub position: DVec3,
-    /// Unit direction in which spot and directional lights shine.
+    /// Unit direction in which spot and directional lights and panels shine.
     pub direction: DVec3,
     /// Radiance of surfaces, intensity (W/sr) of points and spots, irradiance (W/m²) of parallel
     /// light.
@@ -33,6 +33,14 @@ pub struct LightDesc {
     /// Point and spot: distance in metres at which the light ends; infinite for the square law
     /// alone.
     pub range: f64,
+    /// Point and spot: radius in metres; 0 for a light without extent.
+    pub radius: f64,
+    /// Panel: edges of the rectangle, or of the one around the ellipse, in metres.
+    pub edges: [DVec3; 2],
+    /// Panel: whether it is an ellipse.
+    pub round: bool,
+    /// Lights without a surface in the scene: whether camera rays see them. Reflections do.
+    pub seen_by_camera: bool,
     /// Area: corners of the triangles, front counter-clockwise; indexed as the mesh is.
     pub triangles: Vec<[DVec3; 3]>,
     /// Area: how the strength varies over the triangles, if it does.
@@ -112,6 +120,10 @@ impl Default for LightDesc {
             outer_cone: std::f64::consts::FRAC_PI_4,
             spot_curve: SpotCurve::Gltf,
             range: f64::INFINITY,
+            radius: 0.0,
+            edges: [DVec3::X, DVec3::Y],
+            round: false,
+            seen_by_camera: true,
             triangles: Vec::new(),
             map: None,
             spheres: Vec::new(),

@@ -16,6 +16,7 @@ struct DirectionalLight {
     /// At normal incidence.
     irradiance: Rgb,
     scene: BoundingSphere,
+    seen_by_camera: bool,
     disc: Option<Disc>,
 }
 
@@ -78,6 +79,10 @@ impl Light for DirectionalLight {
 
     fn radiance(&self, _on: &Surface<'_>) -> Rgb {
         Rgb::ZERO
+    }
+
+    fn seen_by_camera(&self) -> bool {
+        self.seen_by_camera
     }
 
     fn is_infinite(&self) -> bool {
@@ -157,6 +162,7 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
         frame: Frame::from_normal(direction),
         irradiance: d.strength,
         scene: d.scene,
+        seen_by_camera: d.seen_by_camera,
         disc,
     }))
 }

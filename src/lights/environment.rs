@@ -16,6 +16,7 @@ struct Environment {
     /// World from the sky's directions.
     rotation: DQuat,
     scene: BoundingSphere,
+    seen_by_camera: bool,
 }
 
 impl Environment {
@@ -69,6 +70,10 @@ impl Light for Environment {
         Rgb::ZERO
     }
 
+    fn seen_by_camera(&self) -> bool {
+        self.seen_by_camera
+    }
+
     fn is_infinite(&self) -> bool {
         true
     }
@@ -115,6 +120,7 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
         strength: d.strength,
         rotation: d.rotation,
         scene: d.scene,
+        seen_by_camera: d.seen_by_camera,
     }))
 }
 

@@ -5,10 +5,12 @@
 //! Units: flux W, intensity W/sr, irradiance W/m², radiance W/(m²·sr), each per RGB channel.
 
 mod area;
+mod ball;
 mod desc;
 mod directional;
 mod ellipsoid;
 mod environment;
+mod panel;
 mod point;
 mod sky;
 mod sphere;
@@ -71,6 +73,15 @@ pub struct Distant {
     pub irradiance: Rgb,
 }
 
+/// What a ray sees of a light that it passes through.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    /// Radiance.
+    pub radiance: Rgb,
+    /// Density in solid angle with which [`Light::sample_li`] finds this direction.
+    pub pdf: f64,
+}
+
 /// A light source.
 pub trait Light: Send + Sync {
     /// Emitted flux in W; for parallel light that through the scene's disc.
@@ -119,6 +130,23 @@ pub trait Light: Send + Sync {
         0.0
     }
 
+    /// Whether it is neither a surface of the scene nor at infinity, and yet has extent: rays see
+    /// it and pass through.
+    fn is_bodiless(&self) -> bool {
+        false
+    }
+
+    /// What a ray sees of a bodiless light that starts at `from` and runs along the unit direction
+    /// `dir` for less than `reach` metres.
+    fn crossed(&self, _from: DVec3, _dir: DVec3, _reach: f64) -> Option<Crossing> {
+        None
+    }
+
+    /// Whether camera rays see it, if it is bodiless or at infinity.
+    fn seen_by_camera(&self) -> bool {
+        true
+    }
+
     /// A point where photons leave.
     fn sample_origin(&self, u: [f64; 2]) -> Option<EmissionOrigin>;
 
@@ -161,6 +189,7 @@ crate::registry::impl_entry!(LightEntry, "light");
 /// The light kinds.
 pub static LIGHTS: &[LightEntry] = &[
     area::ENTRY,
+    panel::ENTRY,
     sphere::ENTRY,
     ellipsoid::ENTRY,
     point::ENTRY,

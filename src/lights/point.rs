@@ -1,7 +1,8 @@
-//! `point`: the same intensity in every direction.
+//! `point`: the same intensity in every direction; with a radius, a ball.
 
 use std::f64::consts::PI;
 
+use super::ball::Ball;
 use super::{EmissionOrigin, LiSample, Light, LightEntry, range_window};
 use crate::color::Rgb;
 use crate::geometry::{Surface, SurfacePoint};
@@ -88,8 +89,11 @@ impl Light for PointLight {
 /// The registry's line.
 pub(super) const ENTRY: LightEntry = LightEntry {
     name: "point",
-    doc: "a point that shines equally in every direction",
+    doc: "a point or a ball that shines equally in every direction",
     build: |d| {
+        if d.radius > 0.0 {
+            return Ok(Box::new(Ball::new(d, None)?));
+        }
         Ok(Box::new(PointLight {
             position: d.position,
             intensity: d.strength,

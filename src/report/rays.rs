@@ -137,7 +137,7 @@ impl RayMaker<'_> {
 
     fn camera_ray(&self, rng: &mut Rng) -> Ray {
         let [x, y] = rng.next_2d();
-        let (o, d) = self.camera.ray(x, y);
+        let (o, d) = self.camera.ray(x, y, [0.5; 2]);
         Ray::new(o, d)
     }
 

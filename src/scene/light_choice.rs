@@ -19,7 +19,16 @@ const EVEN: f64 = 0.1;
 pub struct LightChoice {
     by_flux: Discrete,
     infinite: Vec<LightId>,
+    bodiless: Vec<LightId>,
     n: usize,
+}
+
+/// The lights that are such.
+fn those(lights: &[Box<dyn Light>], such: impl Fn(&dyn Light) -> bool) -> Vec<LightId> {
+    (0..lights.len())
+        .filter(|&i| such(&*lights[i]))
+        .map(|i| LightId(i as u32))
+        .collect()
 }
 
 /// Probabilities of all lights at one point.
@@ -30,10 +39,8 @@ impl LightChoice {
     pub fn new(lights: &[Box<dyn Light>]) -> Self {
         Self {
             by_flux: Discrete::new(lights.iter().map(|l| l.power().luminance())),
-            infinite: (0..lights.len())
-                .filter(|&i| lights[i].is_infinite())
-                .map(|i| LightId(i as u32))
-                .collect(),
+            infinite: those(lights, |l| l.is_infinite()),
+            bodiless: those(lights, |l| l.is_bodiless()),
             n: lights.len(),
         }
     }
@@ -41,6 +48,11 @@ impl LightChoice {
     /// The lights at infinity that rays see.
     pub(super) fn infinite(&self) -> &[LightId] {
         &self.infinite
+    }
+
+    /// The lights that rays see and pass through.
+    pub(super) fn bodiless(&self) -> &[LightId] {
+        &self.bodiless
     }
 
     /// Probabilities at `p`; `None` if no light reaches it.

@@ -126,6 +126,12 @@ impl Scene {
         self.choose_light.infinite()
     }
 
+    /// The lights that rays see and pass through.
+    #[inline]
+    pub fn bodiless(&self) -> &[LightId] {
+        self.choose_light.bodiless()
+    }
+
     /// Probability that [`pick_light`](Self::pick_light) chooses `id` at `p`.
     #[inline]
     pub fn light_probability(&self, p: DVec3, id: LightId) -> f64 {

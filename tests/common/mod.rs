@@ -111,6 +111,8 @@ pub fn camera(eye: DVec3, yfov_degrees: f64) -> CameraDesc {
         world_from_camera: DAffine3::from_translation(eye),
         vertical: yfov_degrees.to_radians(),
         aspect: Some(1.0),
+        shift: [0.0; 2],
+        lens: None,
     }
 }
 
@@ -129,6 +131,8 @@ pub fn look_at(kind: &'static str, eye: DVec3, target: DVec3, vertical: f64) -> 
         world_from_camera: DAffine3::from_cols(x, z.cross(x), z, eye),
         vertical,
         aspect: Some(1.0),
+        shift: [0.0; 2],
+        lens: None,
     }
 }
 

@@ -1,0 +1,327 @@
+//! What files say in their extras under our name, and lights as they are read.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+mod asset;
+
+use std::f64::consts::PI;
+
+use asset::Asset;
+use dualight::color::units::LightUnits;
+use dualight::import::ImportOptions;
+use dualight::math::DVec3;
+use dualight::scene::Scene;
+use serde_json::{Value, json};
+
+/// A triangle, and node 1 with what `node` says.
+fn with_node(node: Value) -> Asset {
+    let mut a = Asset::triangle();
+    a.json["nodes"] = json!([{"mesh": 0}, node]);
+    a.json["scenes"] = json!([{"nodes": [0, 1]}]);
+    a
+}
+
+fn with_light(light: Value) -> Asset {
+    let mut a = with_node(json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
+    a.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
+    a
+}
+
+fn with_camera(extras: Value) -> Asset {
+    let mut a = with_node(json!({"camera": 0}));
+    a.json["cameras"] = json!([{
+        "type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1},
+        "extras": {"dualight": extras}
+    }]);
+    a
+}
+
+fn area(area: Value) -> Asset {
+    with_node(json!({
+        "name": "Area", "scale": [2, 3, 1],
+        "extras": {"dualight": {"area_light": area}, "stranger": 1}
+    }))
+}
+
+fn flux(scene: &Scene) -> f64 {
+    scene.flux().g
+}
+
+fn close(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-9 * b.abs()
+}
+
+#[test]
+fn area_lights_have_the_power_and_the_colour_they_name() {
+    for (shape, size) in [
+        ("square", json!(0.5)),
+        ("disk", json!(0.5)),
+        ("rectangle", json!([0.5, 0.25])),
+        ("ellipse", json!([0.5, 0.25])),
+    ] {
+        let a = area(json!({
+            "shape": shape, "size": size, "power": 60, "color": [1, 0.5, 0.25]
+        }));
+        let scene = a.read().unwrap();
+        assert_eq!(scene.warnings, Vec::<String>::new());
+        let f = scene.flux();
+        // Whatever the node's scale does to its size.
+        assert!(
+            close(f.r, 60.0) && close(f.g, 30.0) && close(f.b, 15.0),
+            "{f:?}"
+        );
+        assert_eq!(scene.light_names[0], ("Area".into(), "panel"));
+        // Along −z of the node, and not to the camera.
+        let light = &scene.lights[0];
+        assert!(light.sample_li(DVec3::NEG_Z, [0.5; 2]).is_some());
+        assert!(light.sample_li(DVec3::Z, [0.5; 2]).is_none());
+        assert!(!light.seen_by_camera());
+        let l = light.crossed(DVec3::NEG_Z, DVec3::Z, 2.0).unwrap().radiance;
+        let surface = 6.0
+            * match shape {
+                "square" => 0.25,
+                "disk" => 0.25 * PI / 4.0,
+                "rectangle" => 0.125,
+                _ => 0.125 * PI / 4.0,
+            };
+        assert!(close(l.r, 60.0 / (PI * surface)), "{shape}: {l:?}");
+    }
+}
+
+#[test]
+fn what_is_wrong_in_our_extras_is_told_with_its_place() {
+    let place = "/nodes/1/extras/dualight/area_light";
+    for (bad, at, what) in [
+        (
+            json!({"size": 1, "power": 1}),
+            place.to_owned(),
+            "'shape' is missing",
+        ),
+        (
+            json!({"shape": "square", "power": 1}),
+            place.to_owned(),
+            "'size' is missing",
+        ),
+        (
+            json!({"shape": "disk", "size": 1}),
+            place.to_owned(),
+            "'power' is missing",
+        ),
+        (
+            json!({"shape": "star", "size": 1, "power": 1}),
+            format!("{place}/shape"),
+            "'star'",
+        ),
+        (
+            json!({"shape": 5, "size": 1, "power": 1}),
+            format!("{place}/shape"),
+            "string",
+        ),
+        (
+            json!({"shape": "disk", "size": -1, "power": 1}),
+            format!("{place}/size"),
+            "above 0",
+        ),
+        (
+            json!({"shape": "ellipse", "size": [1, 0], "power": 1}),
+            format!("{place}/size"),
+            "above 0",
+        ),
+        (
+            json!({"shape": "disk", "size": 1, "power": "x"}),
+            format!("{place}/power"),
+            "number",
+        ),
+        (
+            json!({"shape": "disk", "size": 1, "power": 1, "color": [1, -1, 0]}),
+            format!("{place}/color"),
+            "colour",
+        ),
+        (
+            json!({"shape": "disk", "size": 1, "power": 1, "seen_by_camera": 1}),
+            format!("{place}/seen_by_camera"),
+            "neither true nor false",
+        ),
+        (json!(7), place.to_owned(), "not an object"),
+    ] {
+        let text = area(bad.clone()).error();
+        assert!(text.contains(&format!("{at}: ")), "{bad}: {text}");
+        assert!(
+            text.contains(what) && text.lines().count() == 1,
+            "{bad}: {text}"
+        );
+    }
+    let text = with_camera(json!({"f_stop": 2.8})).error();
+    assert!(text.contains("/cameras/0/extras/dualight: has an f_stop, but no focal_length"));
+    let text = with_camera(json!({"aperture_radius": 0.1})).error();
+    assert!(text.contains("no focus_distance"), "{text}");
+    let lens = json!({"aperture_radius": 0.1, "focus_distance": 1, "blades": 2});
+    let text = with_camera(lens).error();
+    assert!(
+        text.contains("/cameras/0/extras/dualight/blades: 2 is"),
+        "{text}"
+    );
+}
+
+#[test]
+fn names_that_nobody_knows_are_a_warning() {
+    let mut a = area(json!({"shape": "disk", "size": 1, "power": 1, "spread": 1}));
+    a.json["nodes"][1]["extras"]["dualight"]["colour"] = json!(1);
+    let warnings = a.read().unwrap().warnings;
+    assert!(warnings[0].contains("/nodes/1/extras/dualight/area_light: 'spread'"));
+    assert!(warnings[1].contains("/nodes/1/extras/dualight: 'colour' is not known"));
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    // A radius is nothing that a sun has.
+    let a = with_light(json!({"type": "directional", "extras": {"dualight": {"radius": 1}}}));
+    assert!(a.read().unwrap().warnings[0].contains("known: angle, seen_by_camera"));
+}
+
+#[test]
+fn points_spots_and_suns_get_their_extent_and_keep_their_power() {
+    let blender = "Khronos glTF Blender I/O v5.0.21";
+    for (kind, extras, solid_angle) in [
+        ("point", json!({"radius": 0.1}), 4.0 * PI),
+        ("spot", json!({"radius": 0.1}), PI),
+    ] {
+        let mut a = with_light(json!({
+            "type": kind, "intensity": 683, "spot": {"outerConeAngle": PI / 2.0},
+            "extras": {"dualight": extras}
+        }));
+        a.json["asset"]["generator"] = json!(blender);
+        let scene = a.read().unwrap();
+        assert!(scene.lights[0].is_bodiless() && !scene.lights[0].seen_by_camera());
+        // A smooth step over the whole cone leaves half of its solid angle.
+        assert!(close(flux(&scene), solid_angle), "{kind}: {}", flux(&scene));
+    }
+    let a = with_light(json!({
+        "type": "directional", "intensity": 683, "extras": {"dualight": {"angle": 0.1}}
+    }));
+    let scene = a.read().unwrap();
+    let sun = &scene.lights[0];
+    assert!(sun.is_infinite() && !sun.seen_by_camera());
+    // As Cycles shows it: E / (π sin²).
+    let l = sun.escaped(DVec3::Z).g;
+    assert!(close(l, 1.0 / (PI * 0.05f64.sin().powi(2))), "{l}");
+    assert_eq!(sun.escaped(DVec3::new(0.052, 0.0, 1.0).normalize()).g, 0.0);
+}
+
+#[test]
+fn units_are_those_of_the_files_writer_unless_they_are_given() {
+    let light = json!({"type": "point", "intensity": 683.0});
+    for (generator, note) in [
+        ("Khronos glTF Blender I/O v4.0", "as Blender exports them"),
+        ("somebody", "candela and lux"),
+    ] {
+        let mut a = with_light(light.clone());
+        a.json["asset"]["generator"] = json!(generator);
+        let scene = a.read().unwrap();
+        assert!(scene.notes[0].contains(note), "{:?}", scene.notes);
+        assert!(close(flux(&scene), 4.0 * PI));
+    }
+    for (light_units, factor) in [
+        (LightUnits::Blender, 1.0),
+        (LightUnits::Photometric, 1.0),
+        (LightUnits::Radiometric, 683.0),
+    ] {
+        let options = ImportOptions {
+            light_units,
+            ..Default::default()
+        };
+        let scene = with_light(light.clone()).read_with(&options).unwrap();
+        assert!(scene.notes.is_empty() && close(flux(&scene), factor * 4.0 * PI));
+    }
+}
+
+#[test]
+fn strange_numbers_make_no_strange_light() {
+    for (light, n) in [
+        (json!({"type": "point", "intensity": -5}), 0),
+        (json!({"type": "point", "intensity": 0}), 0),
+        (json!({"type": "point", "color": [-1, -1, -1]}), 0),
+        (json!({"type": "spot", "spot": {"outerConeAngle": 0}}), 0),
+        (json!({"type": "spot", "spot": {"outerConeAngle": -1}}), 0),
+        (
+            json!({"type": "spot", "spot": {"innerConeAngle": 0.5, "outerConeAngle": 0.5}}),
+            1,
+        ),
+        (
+            json!({"type": "spot", "spot": {"innerConeAngle": 2, "outerConeAngle": 0.5}}),
+            1,
+        ),
+        (json!({"type": "spot", "spot": {"outerConeAngle": 9}}), 1),
+        (json!({"type": "spot"}), 1),
+        (json!({"type": "directional"}), 1),
+    ] {
+        for generator in ["Khronos glTF Blender I/O", "x"] {
+            let mut a = with_light(light.clone());
+            a.json["asset"]["generator"] = json!(generator);
+            let scene = a.read().unwrap();
+            assert_eq!(scene.lights.len(), n, "{light}");
+            assert!(scene.flux().r.is_finite() && scene.flux().r >= 0.0);
+            for l in &scene.lights {
+                for p in [DVec3::ZERO, DVec3::NEG_Z, DVec3::new(0.3, 0.2, -1.0)] {
+                    let li = l.sample_li(p, [0.3, 0.7]);
+                    assert!(li.is_none_or(|l| l.radiance.g.is_finite()), "{light}");
+                }
+            }
+        }
+    }
+    let text = with_light(json!({"type": "point", "range": 0})).error();
+    assert!(
+        text.contains("/extensions/KHR_lights_punctual/lights/0"),
+        "{text}"
+    );
+}
+
+#[test]
+fn cameras_get_their_lens_and_shift() {
+    let a = with_camera(json!({
+        "f_stop": 2.0, "focal_length": 0.05, "focus_distance": 3, "blades": 6,
+        "blade_rotation": 0.5, "aperture_ratio": 2, "shift": [0.1, -0.2]
+    }));
+    let scene = a.read().unwrap();
+    let camera = &scene.cameras[0];
+    let lens = camera.lens.unwrap();
+    assert!(close(lens.radius, 0.0125) && lens.focus == 3.0 && lens.blades == 6);
+    assert!(lens.rotation == 0.5 && lens.ratio == 2.0 && camera.shift == [0.1, -0.2]);
+    let plain = with_camera(json!({})).read().unwrap();
+    assert!(plain.cameras[0].lens.is_none());
+}
+
+#[test]
+fn a_scene_brings_its_own_environment_and_the_user_may_replace_it() {
+    let mut a = Asset::triangle();
+    a.json["scenes"][0]["extras"] = json!({"dualight": {"environment": {
+        "color": [1, 2, 3], "strength": 0.5, "seen_by_camera": false
+    }}});
+    let scene = a.read().unwrap();
+    assert_eq!(scene.light_names[0].1, "environment");
+    assert_eq!(scene.lights[0].escaped(DVec3::X).b, 1.5);
+    assert!(!scene.lights[0].seen_by_camera());
+    let options = ImportOptions {
+        environment: Some(dualight::import::EnvironmentOption {
+            source: dualight::import::EnvironmentSource::Color([7.0; 3]),
+            strength: 1.0,
+            rotation: 0.0,
+            seen_by_camera: true,
+        }),
+        ..Default::default()
+    };
+    let scene = a.read_with(&options).unwrap();
+    assert_eq!(scene.lights.len(), 1);
+    assert_eq!(scene.lights[0].escaped(DVec3::X).b, 7.0);
+
+    let env = |a: &mut Asset, e: Value| {
+        a.json["scenes"][0]["extras"] = json!({"dualight": {"environment": e}});
+        a.error()
+    };
+    let text = env(&mut a, json!({"strength": 1}));
+    assert!(
+        text.contains("/scenes/0/extras/dualight/environment: has not exactly one"),
+        "{text}"
+    );
+    let text = env(&mut a, json!({"image": "no.hdr"}));
+    assert!(
+        text.contains("no.hdr") && text.lines().count() == 1,
+        "{text}"
+    );
+}
