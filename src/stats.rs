@@ -15,6 +15,8 @@ pub struct RayCounts {
     pub gather: u64,
     /// Photon path segments.
     pub photon: u64,
+    /// Traced to plan where photons leave.
+    pub check: u64,
 }
 
 impl RayCounts {
@@ -25,6 +27,7 @@ impl RayCounts {
         self.bounce += o.bounce;
         self.gather += o.gather;
         self.photon += o.photon;
+        self.check += o.check;
     }
 }
 
@@ -33,6 +36,10 @@ impl RayCounts {
 pub struct PhotonCounts {
     /// Photons that left lights.
     pub emitted: u64,
+    /// Rays traced to plan the emission.
+    pub checked: u64,
+    /// Cells that it was planned in.
+    pub cells: u64,
     /// Photons stored.
     pub stored: u64,
     /// Of the emitted ones, those that hit nothing useful and were given up.

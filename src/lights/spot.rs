@@ -19,6 +19,46 @@ pub(super) struct Cone {
     curve: SpotCurve,
 }
 
+impl SpotCurve {
+    /// Relative intensity at `t` of the way from the outer to the inner cone.
+    #[inline]
+    fn value(self, t: f64) -> f64 {
+        match self {
+            Self::Gltf => t * t,
+            Self::Cycles => t * t * (3.0 - 2.0 * t),
+        }
+    }
+
+    /// Its integral from 0 to `t`.
+    #[inline]
+    fn integral(self, t: f64) -> f64 {
+        match self {
+            Self::Gltf => t * t * t / 3.0,
+            Self::Cycles => t * t * t * (1.0 - 0.5 * t),
+        }
+    }
+
+    /// Where the integral has the value `i`.
+    #[inline]
+    fn inverse_integral(self, i: f64) -> f64 {
+        match self {
+            Self::Gltf => (3.0 * i).cbrt(),
+            Self::Cycles => {
+                // Newton's method from below, where the integral is convex enough to converge
+                // from: t³ = i + t⁴/2 > i.
+                let mut t = i.cbrt();
+                for _ in 0..8 {
+                    let slope = self.value(t);
+                    if slope > 0.0 {
+                        t = (t - (self.integral(t) - i) / slope).clamp(0.0, 1.0);
+                    }
+                }
+                t
+            }
+        }
+    }
+}
+
 impl Cone {
     fn new(d: &LightDesc) -> Result<Self, String> {
         let direction = d
@@ -57,27 +97,42 @@ impl Cone {
         } else {
             1.0
         };
-        match self.curve {
-            SpotCurve::Gltf => t * t,
-            SpotCurve::Cycles => t * t * (3.0 - 2.0 * t),
-        }
+        self.curve.value(t)
+    }
+
+    /// Solid angle over 2π of a cone without falloff and of the same flux.
+    #[inline]
+    fn solid_angle(&self) -> f64 {
+        1.0 - self.cos_outer - self.ramp * (1.0 - self.curve.integral(1.0))
     }
 
     /// `∫ falloff dω`.
     pub(super) fn integral(&self) -> f64 {
-        // 2π [(1 − cos_outer) − ramp · (1 − ∫ of the curve over 0..1)].
-        let lost = match self.curve {
-            SpotCurve::Gltf => 2.0 / 3.0,
-            SpotCurve::Cycles => 0.5,
-        };
-        2.0 * PI * (1.0 - self.cos_outer - self.ramp * lost)
+        2.0 * PI * self.solid_angle()
     }
 
-    /// A direction in the cone, and its density.
+    /// A direction in the cone, in proportion to the falloff, and its density.
     pub(super) fn sample(&self, u: [f64; 2]) -> (DVec3, f64) {
-        let complement = 1.0 - self.cos_outer;
-        let local = warp::cone_from_complement(u, complement);
-        (self.frame.to_world(local), warp::cone_pdf(complement))
+        // So all photons carry the same flux.
+        let [x, y] = warp::disc(u);
+        let r2 = x * x + y * y;
+        let total = self.solid_angle();
+        // Uniform: the share of the flux at greater angles.
+        let beyond = (1.0 - r2).max(f64::MIN_POSITIVE) * total;
+        let (height, falloff) = if beyond >= self.ramp * self.curve.integral(1.0) {
+            (r2 * total, 1.0)
+        } else {
+            let t = self.curve.inverse_integral(beyond / self.ramp);
+            (1.0 - self.cos_outer - self.ramp * t, self.curve.value(t))
+        };
+        // Dividing by r² leaves a form that does not cancel in a narrow cone.
+        let scale = if r2 > 0.0 {
+            (height * (2.0 - height) / r2).max(0.0).sqrt()
+        } else {
+            0.0
+        };
+        let local = DVec3::new(x * scale, y * scale, 1.0 - height);
+        (self.frame.to_world(local), falloff / (2.0 * PI * total))
     }
 }
 
@@ -155,3 +210,25 @@ pub(super) const ENTRY: LightEntry = LightEntry {
     doc: "a point that shines into a cone",
     build,
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integrals_are_those_of_the_curves_and_are_inverted() {
+        for curve in [SpotCurve::Gltf, SpotCurve::Cycles] {
+            let mut sum = 0.0;
+            for k in 0..10_000 {
+                let t = f64::from(k) * 1e-4;
+                sum += curve.value(t + 0.5e-4) * 1e-4;
+                assert!((curve.integral(t + 1e-4) - sum).abs() < 1e-8);
+                let back = curve.inverse_integral(curve.integral(t));
+                assert!(
+                    (back - t).abs() < 1e-9 + 1e-4 * f64::from(k == 0),
+                    "{t} {back}"
+                );
+            }
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! How photons leave the lights: the trait and its table.
 
-use super::uniform;
+use super::{adaptive, adaptive_linear, uniform};
 use crate::accel::Accelerator;
 use crate::color::Rgb;
 use crate::geometry::Ray;
@@ -53,6 +53,16 @@ pub trait PhotonSource: Sync {
 
     /// Photon `i`; `None` if the light sends nothing in the chosen direction.
     fn emit(&self, i: u64) -> Option<EmittedPhoton>;
+
+    /// Rays traced to plan the emission, which carry no flux.
+    fn checks(&self) -> u64 {
+        0
+    }
+
+    /// Cells that it is planned in; none if it is not.
+    fn cells(&self) -> u64 {
+        0
+    }
 }
 
 /// An emission that can be chosen.
@@ -69,4 +79,4 @@ pub struct EmissionEntry {
 crate::registry::impl_entry!(EmissionEntry, "emission");
 
 /// The emissions.
-pub static EMISSIONS: &[EmissionEntry] = &[uniform::ENTRY];
+pub static EMISSIONS: &[EmissionEntry] = &[uniform::ENTRY, adaptive::ENTRY, adaptive_linear::ENTRY];

@@ -48,6 +48,7 @@ impl Ledger {
             flux_absorbed: sum(self.absorbed),
             flux_escaped: sum(self.escaped),
             flux_cut: sum(self.cut),
+            ..PhotonCounts::default()
         }
     }
 }

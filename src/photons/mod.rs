@@ -12,6 +12,9 @@
 //!
 //! Emission is a plugin family: one file and one line in [`EMISSIONS`].
 
+mod adaptive;
+mod adaptive_linear;
+mod departure;
 mod emit;
 mod ledger;
 pub mod map;
@@ -97,7 +100,10 @@ pub fn trace_photons(
     let run = |purpose, count, maps: &mut PhotonMaps| {
         let start = Instant::now();
         let source = (emission.build)(&context(purpose, count));
-        let pass = trace::run(scene, accel, &*source, purpose, settings, control);
+        let mut pass = trace::run(scene, accel, &*source, purpose, settings, control);
+        pass.counts.checked = source.checks();
+        pass.counts.cells = source.cells();
+        maps.rays.check += source.checks();
         maps.rays.add(&pass.rays);
         maps.tracing += start.elapsed().as_secs_f64();
         pass

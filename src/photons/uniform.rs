@@ -1,14 +1,11 @@
 //! `uniform`: the conventional emission. Photons are shared among the lights by flux, and each
 //! light's photons are stratified over its surface and its directions.
 
-use std::f64::consts::PI;
-
+use super::departure::leave;
 use super::emit::{EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
 use super::targets::Targets;
-use crate::geometry::{LightId, Ray};
-use crate::lights::Light;
-use crate::math::Frame;
-use crate::sampling::{Sampler, stream, warp};
+use crate::geometry::LightId;
+use crate::sampling::{Sampler, stream};
 use crate::scene::Scene;
 
 struct Uniform<'a> {
@@ -31,71 +28,13 @@ impl PhotonSource for Uniform<'_> {
         let count = self.first[k + 1] - self.first[k];
         let light = self.scene.light(LightId(k as u32));
         let mut sampler = Sampler::new(self.seed, self.stream, k as u64, i - self.first[k]);
-        let photon = match &self.targets {
-            None => leave(light, self.scene, &mut sampler),
-            Some(targets) => leave_toward(light, targets, self.scene, &mut sampler),
-        }?;
+        let (first, second) = (sampler.next_2d(), sampler.next_2d());
+        let photon = leave(light, self.scene, self.targets.as_ref(), first, second)?;
         Some(EmittedPhoton {
             power: photon.power / count as f64,
             ..photon
         })
     }
-}
-
-/// A photon of a light that emits one photon only.
-fn leave(light: &dyn Light, scene: &Scene, sampler: &mut Sampler) -> Option<EmittedPhoton> {
-    let u = sampler.next_2d();
-    if let Some(distant) = light.sample_distant(u) {
-        // Beside the scene, on the disc that its shadow fills.
-        let around = scene.bounds.bounding_sphere();
-        let radius = around.radius * (1.0 + 1e-6);
-        let frame = Frame::from_normal(distant.direction);
-        let [x, y] = warp::disc(sampler.next_2d());
-        let p = around.center + (frame.x * x + frame.y * y - frame.z) * radius;
-        return Some(EmittedPhoton {
-            ray: Ray::new(p, distant.direction),
-            power: distant.irradiance * (PI * radius * radius),
-            range: f64::INFINITY,
-        });
-    }
-    let from = light.sample_origin(u)?;
-    let (dir, pdf) = light.sample_direction(&from, sampler.next_2d());
-    let power = light.emitted(&from, dir) / (from.pdf_area * pdf);
-    (!power.is_black()).then(|| EmittedPhoton {
-        ray: from.ray(dir),
-        power,
-        range: light.range(),
-    })
-}
-
-/// As [`leave`], toward specular objects only.
-fn leave_toward(
-    light: &dyn Light,
-    targets: &Targets,
-    scene: &Scene,
-    sampler: &mut Sampler,
-) -> Option<EmittedPhoton> {
-    let u = sampler.next_2d();
-    if let Some(distant) = light.sample_distant(u) {
-        let (p, pdf) = targets.sample_disc(distant.direction, sampler.next_2d())?;
-        // From beside the target back out of the scene.
-        let around = scene.bounds.bounding_sphere();
-        let depth = (p - around.center).dot(distant.direction) + around.radius;
-        let ray = Ray::new(p - distant.direction * depth.max(0.0), distant.direction);
-        return Some(EmittedPhoton {
-            ray,
-            power: distant.irradiance / pdf,
-            range: f64::INFINITY,
-        });
-    }
-    let from = light.sample_origin(u)?;
-    let (dir, pdf) = targets.sample_direction(from.p, sampler.next_2d())?;
-    let power = light.emitted(&from, dir) / (from.pdf_area * pdf);
-    (!power.is_black()).then(|| EmittedPhoton {
-        ray: from.ray(dir),
-        power,
-        range: light.range(),
-    })
 }
 
 /// Shares `count` among lights in proportion to flux; every light with flux gets at least one.
