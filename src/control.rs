@@ -1,5 +1,6 @@
 //! Stopping early and telling how far things are: what a long stage needs from outside.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -35,7 +36,7 @@ impl Reporter for Silent {
 
 /// The outside world of a run.
 pub struct Control {
-    stop: AtomicU8,
+    stop: Arc<AtomicU8>,
     deadline: Option<Instant>,
     reporter: Box<dyn Reporter>,
 }
@@ -50,9 +51,19 @@ impl Control {
     /// Reports to `reporter` and stops at `deadline`, if there is one.
     pub fn new(reporter: Box<dyn Reporter>, deadline: Option<Instant>) -> Self {
         Self {
-            stop: AtomicU8::new(0),
+            stop: Arc::default(),
             deadline,
             reporter,
+        }
+    }
+
+    /// One that stops when this one does and says nothing: for a part of the work whose stages
+    /// are of no interest.
+    pub fn silent(&self) -> Self {
+        Self {
+            stop: self.stop.clone(),
+            deadline: self.deadline,
+            reporter: Box::new(Silent),
         }
     }
 

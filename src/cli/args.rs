@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::measure_args::AccuracyArgs;
 use super::values::{self, Crop, Size};
 use crate::report::ErrorMap;
 
@@ -18,6 +19,7 @@ Examples:
   dualight render scene.glb -o out.png --size 1920x1080 --spp 64 --photons 5M --time-limit 10m
   dualight diff out.exr reference.exr -o error.png
   dualight compare scene.glb --rays 10M
+  dualight accuracy scene.glb -o accuracy.html --budget 10m
 
 Exit status: 0 done, 1 rendering or reading or writing failed or backends differ, 2 usage, 3 the file requires \
 something unsupported, 4 stopped at the time limit with a valid image, 130 interrupted.")]
@@ -47,6 +49,8 @@ pub enum Command {
     Diff(DiffArgs),
     /// Compare two ray tracing backends on the same rays; every difference is explained or a bug
     Compare(CompareArgs),
+    /// Measure what accuracy costs in time: error against seconds, method by method
+    Accuracy(AccuracyArgs),
 }
 
 /// What the numbers of a file's lights mean.

@@ -1,12 +1,15 @@
 //! The command line: what was typed ([`args`]), what it means ([`plan`]), and one function per
 //! command.
 
+mod accuracy;
 pub mod args;
 mod compare;
 mod console;
 mod diff;
 mod format;
 mod inspect;
+mod machine;
+pub mod measure_args;
 pub mod plan;
 mod plugins;
 pub mod progress;
@@ -58,5 +61,6 @@ pub fn run(cli: &Cli) -> Result<Ending> {
         Command::Plugins => plugins::run(),
         Command::Diff(args) => diff::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Accuracy(args) => accuracy::run(args),
     }
 }

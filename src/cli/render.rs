@@ -175,7 +175,7 @@ fn unsampled(film: &Film, crop: Option<[u32; 4]>) -> usize {
 }
 
 /// The command as typed, such that a shell would understand it.
-fn command_line() -> String {
+pub(super) fn command_line() -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
     std::env::args_os()
         .map(|w| {

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::film::Image;
 
 /// Added to the squared reference, so that black pixels of the reference do not rule the mean.
-const EPSILON: f64 = 0.01;
+pub(super) const EPSILON: f64 = 0.01;
 
 /// One pixel in so many is left out of the trimmed mean.
 const TRIM: usize = 1000;

@@ -1,10 +1,13 @@
 //! Reports about images and runs: what numbers say about them.
 
+pub mod accuracy;
 pub mod agreement;
 pub mod diff;
 mod error_image;
 #[cfg(feature = "flip")]
 mod flip;
 pub mod rays;
+pub mod statistics;
+pub mod svg;
 
 pub use error_image::{ErrorMap, error_image};

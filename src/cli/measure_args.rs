@@ -1,0 +1,67 @@
+//! What was typed after the commands that measure. Parsing touches no file.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::args::SceneArgs;
+use super::values::{self, Size};
+use crate::report::accuracy::Clock;
+
+/// Options of `dualight accuracy`.
+#[derive(Clone, Debug, Args)]
+pub struct AccuracyArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as the help of the command")]
+    pub scene: SceneArgs,
+    /// Report to write: .html the whole page, .svg the first plot, .csv and .json the numbers. May
+    /// be given several times [default: only the table below]
+    #[arg(short, long = "output", value_name = "FILE")]
+    pub outputs: Vec<PathBuf>,
+    /// Methods, the first being what the others are compared with [default: all there are]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub methods: Vec<String>,
+    /// Image to judge by (.exr), of the same size [default: computed by path]
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference: Option<PathBuf>,
+    /// Error of a computed reference, as a part of the smallest error measured
+    #[arg(long, value_name = "X", default_value = "0.1", value_parser = values::factor)]
+    pub reference_error: f64,
+    /// Time for all of it, about; the ladders are planned to fit
+    #[arg(long, value_name = "TIME", default_value = "5m", value_parser = values::duration)]
+    pub budget: Duration,
+    /// Seeds per setting
+    #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(2..=1000))]
+    pub seeds: u32,
+    /// Leave out the single changes that show what precision costs
+    #[arg(long)]
+    pub no_changes: bool,
+    /// Which time counts
+    #[arg(long, value_enum, default_value = "wall")]
+    pub clock: Clock,
+    /// Size of the pictures in pixels [default: 128 wide, as high as the camera asks for]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Camera to look through; auto frames the whole scene [default: the first of the scene]
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Exposure in stops at which FLIP and the page look at pictures
+    #[arg(
+        long,
+        value_name = "STOPS",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
+    #[arg(value_parser = values::stops)]
+    pub exposure: f64,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Threads [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = values::positive_u32)]
+    pub threads: Option<u32>,
+    /// Print nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}

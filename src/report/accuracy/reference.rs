@@ -1,0 +1,117 @@
+//! What pictures are judged by: a file, or a long run of path tracing.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::layers::{Layers, Moments, Scale};
+use super::measure::Renderer;
+use crate::error::{Error, Result};
+use crate::output;
+use crate::pipeline::RenderSettings;
+use crate::sampling::hash2;
+
+/// Pictures that a computed reference is the mean of, at least: their spread is its error.
+const LEAST: u32 = 8;
+
+/// Samples per pixel of each of these pictures.
+const SAMPLES: u32 = 64;
+
+/// A reference and how good it is.
+#[derive(Debug)]
+pub struct Reference {
+    /// Its pixels.
+    pub layers: Layers,
+    /// Its own relative mean squared error in each layer, 0 if unknown.
+    pub error: Vec<f64>,
+    /// What it is, for the report.
+    pub origin: String,
+    /// Whether its error is as small as was asked for.
+    pub good: bool,
+}
+
+/// Reads a reference of the given size.
+pub(super) fn read(path: &Path, width: u32, height: u32) -> Result<Reference> {
+    let refuse = |problem: String, remedy: &str| Error::file(path, problem, remedy);
+    let image = output::read(path)?;
+    let layers = Layers::new(&image)
+        .ok_or_else(|| refuse("has no channels R, G, B".into(), "give a colour image"))?;
+    if (layers.width, layers.height) != (width, height) {
+        return Err(refuse(
+            format!(
+                "is {}x{}, not {width}x{height}",
+                layers.width, layers.height
+            ),
+            "give the size of the reference with --size",
+        ));
+    }
+    let error = vec![0.0; layers.pixels.len()];
+    Ok(Reference {
+        layers,
+        error,
+        origin: format!("{}; its own error is not known", path.display()),
+        good: true,
+    })
+}
+
+/// Computes a reference by `path` until its own error is at most `goal` or `seconds` are over;
+/// `None` if stopped.
+///
+/// `goal` is asked with the mean so far, once there is one: what it is a fraction of depends on
+/// the reference itself.
+pub(super) fn compute(
+    renderer: &Renderer<'_>,
+    base: &RenderSettings,
+    seconds: f64,
+    goal: impl Fn(&Layers) -> f64,
+) -> Result<Option<Reference>> {
+    let start = Instant::now();
+    let stage = renderer
+        .control
+        .stage("reference", "ms", (seconds * 1e3) as u64);
+    let mut settings = RenderSettings {
+        integrator: Some("path".into()),
+        spp: SAMPLES,
+        ..base.clone()
+    };
+    let (width, height) = (base.width, base.height);
+    let mut moments = Moments::new(width as usize * height as usize);
+    let (mut told, mut next) = (0, LEAST);
+    loop {
+        // No measured picture has one of these seeds.
+        settings.integrator_settings.seed = hash2(
+            base.integrator_settings.seed ^ 0x5eed_0f4e_fe4e_9ce5,
+            u64::from(moments.count),
+        );
+        let Some((layers, ..)) = renderer.render(&settings)? else {
+            return Ok(None);
+        };
+        moments.add(&layers);
+        let now = (start.elapsed().as_secs_f64() * 1e3) as u64;
+        stage.advance(now - told);
+        told = now;
+        let over = start.elapsed().as_secs_f64() >= seconds;
+        if moments.count < next && !(over && moments.count >= LEAST) {
+            continue;
+        }
+        // Looking costs about as much as a picture of a few samples.
+        next = moments.count + moments.count.div_ceil(8);
+        let layers = moments.mean_layers(width, height);
+        let scale = Scale::new(layers.beauty());
+        let error: Vec<f64> = (0..layers.pixels.len())
+            .map(|k| moments.noise(k, &scale) / f64::from(moments.count))
+            .collect();
+        let good = error[0] <= goal(&layers);
+        if good || over {
+            let spp = u64::from(SAMPLES) * u64::from(moments.count);
+            return Ok(Some(Reference {
+                layers,
+                origin: format!(
+                    "path, {spp} samples per pixel; its own relMSE is {:.1e}",
+                    error[0]
+                ),
+                error,
+                good,
+            }));
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! A study as text, CSV and JSON.
+
+use std::fmt::Write;
+
+use serde_json::{Value, json};
+
+use super::{Analysis, Circumstances, Level, Study};
+use crate::report::statistics::Interval;
+
+/// Three digits and the interval: `0.0123 [0.011, 0.014]`.
+pub(super) fn interval(i: &Interval) -> String {
+    format!("{} [{}, {}]", short(i.value), short(i.low), short(i.high))
+}
+
+/// About three digits.
+pub(super) fn short(v: f64) -> String {
+    match v.abs() {
+        0.0 => "0".into(),
+        a if !(1e-3..1e4).contains(&a) => format!("{v:.2e}"),
+        a if a >= 100.0 => format!("{v:.0}"),
+        // From 0.001 to 100: as many decimals as make three digits.
+        a => {
+            let decimals = (2.0 - a.log10().floor()) as usize;
+            format!("{v:.decimals$}")
+        }
+    }
+}
+
+/// The seconds that a method takes to a level, in words.
+pub(super) fn seconds(l: &Level) -> String {
+    match (&l.seconds, l.at_most) {
+        (Some(i), _) => interval(i),
+        (None, Some(t)) => format!("at most {}", short(t)),
+        (None, None) => "not reached".into(),
+    }
+}
+
+/// How many times faster than the first method, in words.
+pub(super) fn ratio(l: &Level) -> String {
+    match &l.ratio {
+        Some(r) if l.differs => interval(r),
+        Some(_) => "none".into(),
+        None => "unknown".into(),
+    }
+}
+
+/// The answer in a few lines.
+pub fn text(analysis: &Analysis) -> String {
+    let mut out = String::new();
+    // Writing to a string does not fail.
+    let _ = writeln!(
+        out,
+        "{:<18} {:>9} {:>28} {:>28}",
+        "method", "relMSE", "seconds", "times faster"
+    );
+    for c in &analysis.curves {
+        for l in &c.times {
+            let _ = writeln!(
+                out,
+                "{:<18} {:>9} {:>28} {:>28}",
+                c.method,
+                short(l.error),
+                seconds(l),
+                ratio(l)
+            );
+        }
+        if let Some(s) = &c.slope {
+            let _ = writeln!(out, "{:<18} {:>9} {:>28}", c.method, "slope", interval(s));
+        }
+    }
+    let [t, e, both] = analysis.floor.map(|f| 100.0 * (f - 1.0));
+    let _ = writeln!(
+        out,
+        "noise floor: {t:.1} % of time, {e:.1} % of error, {both:.1} % of their product"
+    );
+    out
+}
+
+/// One line per point and layer.
+pub fn csv(analysis: &Analysis) -> String {
+    let mut out = String::from(
+        "name,rung,spp,photons,nearest,layer,seconds,seconds_low,seconds_high,relmse,relmse_low,\
+         relmse_high,noise,bias,bias_low,bias_high,trimmed,flip,flip_low,flip_high\n",
+    );
+    for p in &analysis.points {
+        let of = |v: Option<String>| v.unwrap_or_default();
+        for l in &p.layers {
+            let whole = l.layer.is_empty();
+            let flip = p.flip.filter(|_| whole);
+            // Writing to a string does not fail.
+            let _ = writeln!(
+                out,
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                p.name,
+                of(p.rung.map(|r| r.to_string())),
+                p.spp,
+                of(p.photons.map(|n| n.to_string())),
+                of(p.nearest.map(|n| n.to_string())),
+                if whole { "all" } else { l.layer },
+                p.seconds.value,
+                p.seconds.low,
+                p.seconds.high,
+                l.total.value,
+                l.total.low,
+                l.total.high,
+                l.noise.value,
+                l.bias.value,
+                l.bias.low,
+                l.bias.high,
+                of(whole.then(|| p.trimmed.value.to_string())),
+                of(flip.map(|f| format!("{},{},{}", f.value, f.low, f.high)))
+            );
+        }
+    }
+    out
+}
+
+/// Everything, for programs.
+pub fn json(study: &Study, analysis: &Analysis, circumstances: &Circumstances) -> Value {
+    json!({
+        "schema": "dualight-accuracy-1",
+        "circumstances": circumstances,
+        "clock": study.clock.label(),
+        "reference": study.reference.origin,
+        "reference_error": study.reference.error[0],
+        "noise_floor": {
+            "time": analysis.floor[0],
+            "error": analysis.floor[1],
+            "cost": analysis.floor[2],
+        },
+        "points": analysis.points,
+        "curves": analysis.curves,
+        "changes": analysis.effects,
+        "changes_are_made_to": analysis.base,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        for (v, s) in [
+            (0.0, "0"),
+            (1.0, "1.00"),
+            (0.012_345, "0.0123"),
+            (12.345, "12.3"),
+            (1234.5, "1234"),
+            (1.5e-5, "1.50e-5"),
+            (-0.5, "-0.500"),
+        ] {
+            assert_eq!(short(v), s);
+        }
+    }
+}

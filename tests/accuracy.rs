@@ -1,0 +1,204 @@
+//! `dualight accuracy`: what is measured is consistent, and the page works in a browser, offline.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::OnceLock;
+
+use dualight::control::Control;
+use dualight::import::{self, ImportOptions};
+use dualight::pipeline::RenderSettings;
+use dualight::plugins::Registry;
+use dualight::report::accuracy::{
+    self, Analysis, Circumstances, Clock, Study, StudyOptions, methods,
+};
+
+/// A small study of the box, made once.
+fn measured() -> &'static (Study, Analysis) {
+    static STUDY: OnceLock<(Study, Analysis)> = OnceLock::new();
+    STUDY.get_or_init(|| {
+        let registry = Registry::builtin();
+        let scene = import::load(
+            Path::new("scenes/box.gltf"),
+            &ImportOptions::default(),
+            registry.scene.clone(),
+        )
+        .unwrap();
+        let mut chosen = methods(&registry);
+        chosen.retain(|m| m.name == "path" || m.name == "photon");
+        let options = StudyOptions {
+            methods: chosen,
+            base: RenderSettings {
+                width: 24,
+                height: 20,
+                ..Default::default()
+            },
+            repeats: 3,
+            budget: 2.0,
+            changes: true,
+            reference: None,
+            reference_error: 0.1,
+            exposure: 0.0,
+            clock: Clock::Wall,
+        };
+        let study = accuracy::study(&scene, &registry, options, &Control::default());
+        let study = study.unwrap().unwrap();
+        let analysis = study.analyse();
+        (study, analysis)
+    })
+}
+
+fn page() -> String {
+    let (study, analysis) = measured();
+    let circumstances = Circumstances {
+        scene: "box <&>.gltf".into(),
+        ..Default::default()
+    };
+    accuracy::page(study, analysis, &circumstances, &Registry::builtin()).unwrap()
+}
+
+#[test]
+fn errors_fall_and_are_the_sum_of_their_parts() {
+    let (study, analysis) = measured();
+    for c in &analysis.curves {
+        let ladder: Vec<_> = analysis.curve(&c.method).collect();
+        assert!(ladder.len() >= 2, "{}", c.method);
+        for pair in ladder.windows(2) {
+            assert!(
+                pair[1].error().value < pair[0].error().value,
+                "{}",
+                c.method
+            );
+            assert!(pair[1].spp == 4 * pair[0].spp);
+        }
+    }
+    for p in &analysis.points {
+        // The whole and four components, each the sum of what changes with the seed and what
+        // does not.
+        assert_eq!(p.layers.len(), 5);
+        for l in &p.layers {
+            let sum = l.noise.value + l.bias.value;
+            assert!(
+                (l.total.value - sum).abs() <= 1e-9 + 1e-6 * sum.abs(),
+                "{l:?}"
+            );
+            assert!(l.total.low <= l.total.value && l.total.value <= l.total.high);
+        }
+        assert!(p.seconds.value > 0.0 && p.trimmed.value > 0.0);
+        assert_eq!(p.flip.is_some(), cfg!(feature = "flip"));
+    }
+    // Path tracing has no bias: what there is of it lies within the noise.
+    for p in analysis.curve("path") {
+        let whole = &p.layers[0];
+        assert!(
+            whole.bias.value.abs() < 0.5 * whole.noise.value,
+            "{whole:?}"
+        );
+    }
+    assert!(analysis.floor.iter().all(|f| *f >= 1.0));
+    assert!(study.reference.error[0] > 0.0);
+}
+
+#[test]
+fn single_changes_do_what_they_say() {
+    let (_, analysis) = measured();
+    assert_eq!(analysis.effects.len(), accuracy::CHANGES.len());
+    let of = |name: &str| analysis.effects.iter().find(|e| e.change == name).unwrap();
+    let samples = of("4 times the samples");
+    assert!(samples.error.value < 0.7, "{samples:?}");
+    assert!(samples.time.value > 1.0, "{samples:?}");
+}
+
+#[test]
+fn tables_hold_every_point() {
+    let (study, analysis) = measured();
+    let csv = accuracy::csv(analysis);
+    let mut lines = csv.lines();
+    let columns = lines.next().unwrap().split(',').count();
+    let names: Vec<&str> = lines
+        .map(|l| {
+            let cells: Vec<&str> = l.split(',').collect();
+            // Only the whole picture has FLIP, with its interval in three columns.
+            assert!(cells.len() == columns || cells.len() == columns - 2, "{l}");
+            cells[0]
+        })
+        .collect();
+    assert_eq!(names.len(), 5 * analysis.points.len());
+    let json = accuracy::json(study, analysis, &Circumstances::default());
+    assert_eq!(
+        json["points"].as_array().unwrap().len(),
+        analysis.points.len()
+    );
+    assert_eq!(json["curves"][0]["method"], "path");
+    assert!(accuracy::text(analysis).contains("noise floor"));
+}
+
+/// What a browser is asked to look at once the page is loaded.
+const PROBE: &str = r#"<script>
+addEventListener("load", () => {
+  const seen = e => { const r = e.getBoundingClientRect(); return r.width > 50 && r.height > 50; };
+  const all = s => [...document.querySelectorAll(s)];
+  const images = all("img"), plots = all("svg");
+  const slider = document.getElementById("slider"), over = document.getElementById("over");
+  slider.value = 25; slider.dispatchEvent(new Event("input"));
+  const left = document.getElementById("left");
+  left.selectedIndex = 1; left.dispatchEvent(new Event("change"));
+  const report = {
+    errors: window.problems, images: images.length, plots: plots.length,
+    broken: images.filter(i => !i.complete || i.naturalWidth === 0).length,
+    hidden: images.concat(plots).filter(e => !seen(e)).length,
+    clip: over.style.clipPath, swapped: over.src === document.getElementById(left.value).src,
+  };
+  document.body.innerHTML = "<pre id=report>" + JSON.stringify(report) + "</pre>";
+});
+</script>"#;
+
+#[test]
+fn the_page_works_in_a_browser_without_a_network() {
+    let html = page();
+    for outside in ["http:", "src=\"//", "@import", "url("] {
+        let text = html.replace("http://www.w3.org/2000/svg", "");
+        assert!(!text.contains(outside), "{outside}");
+    }
+    assert!(html.contains("box &lt;&amp;&gt;.gltf"));
+    let browser = ["chromium", "chromium-browser", "google-chrome"]
+        .into_iter()
+        .find(|b| Command::new(b).arg("--version").output().is_ok());
+    let Some(browser) = browser else {
+        eprintln!("skipped: no Chromium in the path");
+        return;
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("page.html");
+    let early = "<script>window.problems = []; addEventListener('error', e => \
+                 problems.push(e.message)); console.error = m => problems.push(m);</script>";
+    let probed = html
+        .replace("</head>", &format!("{early}</head>"))
+        .replace("</body>", &format!("{PROBE}</body>"));
+    std::fs::write(&path, probed).unwrap();
+    let out = Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"])
+        .args([
+            "--host-resolver-rules=MAP * ~NOTFOUND",
+            "--virtual-time-budget=5000",
+        ])
+        .arg(format!("--user-data-dir={}", directory.path().display()))
+        .arg(format!("file://{}", path.display()))
+        .output()
+        .unwrap();
+    let dom = String::from_utf8_lossy(&out.stdout);
+    let report = dom.split_once("<pre id=\"report\">").unwrap().1;
+    let report: serde_json::Value =
+        serde_json::from_str(report.split_once("</pre>").unwrap().0).unwrap();
+    assert_eq!(report["errors"].as_array().unwrap().len(), 0, "{report}");
+    assert_eq!(
+        (&report["broken"], &report["hidden"]),
+        (&0.into(), &0.into()),
+        "{report}"
+    );
+    // Reference, two methods and their errors, and two in the comparison.
+    assert_eq!(report["images"], 7, "{report}");
+    assert!(report["plots"].as_u64().unwrap() >= 6, "{report}");
+    assert!(report["clip"].as_str().unwrap().contains("75%"), "{report}");
+    assert_eq!(report["swapped"], true, "{report}");
+}
