@@ -7,11 +7,11 @@ use crate::control::{Control, Stopped};
 use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
 use crate::film::{Component, Film};
-use crate::integrators::{IntegratorSettings, Region, RenderContext, camera_pass};
-use crate::photons::{PhotonMaps, PhotonSettings, trace_photons};
+use crate::integrators::{IntegratorSettings, Region, RenderContext, Spacing, camera_pass};
+use crate::photons::{PhotonMaps, PhotonPass, PhotonSettings, trace_photons};
 use crate::plugins::Registry;
 use crate::scene::Scene;
-use crate::stats::{StageTime, Statistics, peak_memory};
+use crate::stats::{PhotonCounts, RayCounts, StageTime, Statistics, peak_memory};
 
 /// What to render, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,65 +126,82 @@ fn render_in_pool(
     };
     clock.lap("build");
 
-    let maps = if integrator.photons {
-        let photons = PhotonSettings {
-            seed: options.seed,
-            global: options.photons,
-            caustic: options.caustic_photons,
-            nearest: options.nearest,
-            max_depth: options.max_depth,
-            roulette: options.roulette,
-        };
-        let gather = options.gather_rays > 0;
-        trace_photons(
-            scene,
-            &*accel,
-            emission,
-            effects.set,
-            &photons,
-            gather,
-            control,
-        )
-    } else {
-        PhotonMaps::default()
-    };
-    clock.split("photons", maps.tracing, "photon maps");
-
     if !scene.textures.is_empty() {
         scene.prepare_textures();
         clock.lap("textures");
     }
 
-    let context = RenderContext {
-        scene,
-        accel: &*accel,
-        maps: &maps,
-        effects: effects.set,
-        settings: options,
+    let first = PhotonSettings {
+        seed: options.seed,
+        global: options.photons,
+        caustic: options.caustic_photons,
+        nearest: options.nearest,
+        max_depth: options.max_depth,
+        roulette: options.roulette,
     };
-    let integrator = (integrator.build)(context);
+    let wanted = integrator.photons
+        && effects
+            .set
+            .intersects(EffectSet::CAUSTICS | EffectSet::INDIRECT);
     let mut film = Film::new(settings.width, settings.height);
     film.keep(&components(effects.set));
-    let camera_rays = camera_pass(
-        &*camera,
-        &*integrator,
-        options.seed,
-        settings.spp,
-        !scene.textures.is_empty(),
-        region,
-        &mut film,
-        control,
-    );
-    clock.lap("pixels");
+    let spacing = Spacing::new(settings.width, settings.height, settings.spp);
+    let mut rays = RayCounts::default();
+    let [mut global_photons, mut caustic_photons] = [PhotonCounts::default(); 2];
+    let mut passes = 0;
+    let mut done = 0;
+    while done < settings.spp && control.stopped().is_none() {
+        let mut samples = settings.spp - done;
+        let mut maps = PhotonMaps::default();
+        if wanted {
+            let pass = PhotonPass::new(&first, passes);
+            samples = samples.min(pass.samples);
+            let gather = options.gather_rays > 0;
+            maps = trace_photons(
+                scene,
+                &*accel,
+                emission,
+                effects.set,
+                &pass.photons,
+                gather,
+                control,
+            );
+            global_photons.add_pass(&maps.global_counts, passes);
+            caustic_photons.add_pass(&maps.caustic_counts, passes);
+            rays.add(&maps.rays);
+            clock.split("photons", maps.tracing, "photon maps");
+        }
+        let context = RenderContext {
+            scene,
+            accel: &*accel,
+            maps: &maps,
+            effects: effects.set,
+            settings: options,
+        };
+        let integrator = (integrator.build)(context);
+        let camera_rays = camera_pass(
+            &*camera,
+            &*integrator,
+            options.seed,
+            done..done + samples,
+            &spacing,
+            !scene.textures.is_empty(),
+            region,
+            &mut film,
+            control,
+        );
+        rays.add(&camera_rays);
+        clock.lap("pixels");
+        done += samples;
+        passes += 1;
+    }
 
     let built = accel.stats();
-    let mut rays = maps.rays;
-    rays.add(&camera_rays);
     Ok(Rendering {
         statistics: Statistics {
             rays,
-            global_photons: maps.global_counts,
-            caustic_photons: maps.caustic_counts,
+            global_photons,
+            caustic_photons,
             stages: clock.laps,
             samples_per_pixel: film.sample_range(),
             rejected_pixels: film.rejected(),
@@ -291,25 +308,29 @@ impl Default for Clock {
 impl Clock {
     /// As [`lap`](Self::lap), for two stages of which the first took `seconds`.
     fn split(&mut self, first: &'static str, seconds: f64, second: &'static str) {
-        self.lap(second);
-        if let Some(last) = self.laps.last_mut() {
-            last.seconds = (last.seconds - seconds).max(0.0);
-        }
-        self.laps.insert(
-            self.laps.len() - 1,
-            StageTime {
-                stage: first,
-                seconds,
-            },
-        );
+        let all = self.restart();
+        self.add(first, seconds.min(all));
+        self.add(second, (all - seconds).max(0.0));
     }
 
+    /// Books the time since the last call.
     fn lap(&mut self, stage: &'static str) {
+        let seconds = self.restart();
+        self.add(stage, seconds);
+    }
+
+    fn restart(&mut self) -> f64 {
         let now = Instant::now();
-        self.laps.push(StageTime {
-            stage,
-            seconds: (now - self.last).as_secs_f64(),
-        });
+        let seconds = (now - self.last).as_secs_f64();
         self.last = now;
+        seconds
+    }
+
+    /// Stages that come again are one.
+    fn add(&mut self, stage: &'static str, seconds: f64) {
+        match self.laps.iter_mut().find(|s| s.stage == stage) {
+            Some(lap) => lap.seconds += seconds,
+            None => self.laps.push(StageTime { stage, seconds }),
+        }
     }
 }

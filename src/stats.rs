@@ -54,6 +54,27 @@ pub struct PhotonCounts {
     pub flux_cut: f64,
 }
 
+impl PhotonCounts {
+    /// Adds those of one more pass to those of the `passes` before. What is counted is summed;
+    /// flux is the mean of the passes, each of which carries all of it.
+    pub fn add_pass(&mut self, o: &Self, passes: u32) {
+        self.emitted += o.emitted;
+        self.checked += o.checked;
+        self.cells += o.cells;
+        self.stored += o.stored;
+        self.discarded += o.discarded;
+        let share = 1.0 / (f64::from(passes) + 1.0);
+        for (mean, new) in [
+            (&mut self.flux_emitted, o.flux_emitted),
+            (&mut self.flux_absorbed, o.flux_absorbed),
+            (&mut self.flux_escaped, o.flux_escaped),
+            (&mut self.flux_cut, o.flux_cut),
+        ] {
+            *mean += (new - *mean) * share;
+        }
+    }
+}
+
 /// Seconds of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageTime {

@@ -6,6 +6,7 @@
 
 use arrayvec::ArrayVec;
 use rayon::prelude::*;
+use std::ops::Range;
 
 use super::{BATCH, Integrator, Sample, Scratch, Spacing};
 use crate::cameras::Camera;
@@ -45,28 +46,32 @@ impl Region {
     }
 }
 
-/// Takes `spp` samples in every pixel of `region` and adds them to the film, until done or
-/// stopped. Rays carry differentials if `differentials` are wanted. Returns the rays traced.
+/// Takes the samples of these numbers in every pixel of `region` and adds them to the film, until
+/// done or stopped. Rays carry differentials if `differentials` are wanted. Returns the rays
+/// traced.
 #[expect(clippy::too_many_arguments, reason = "plain input, each used once")]
 pub fn camera_pass(
     camera: &dyn Camera,
     integrator: &dyn Integrator,
     seed: u64,
-    spp: u32,
+    samples: Range<u32>,
+    spacing: &Spacing,
     differentials: bool,
     region: Region,
     film: &mut Film,
     control: &Control,
 ) -> RayCounts {
     let pixels = u64::from(region.x1 - region.x0) * u64::from(region.y1 - region.y0);
-    let stage = control.stage("pixels", "samples", pixels * u64::from(spp));
+    let stage = control.stage("pixels", "samples", pixels * samples.len() as u64);
     let tiles = region.tiles();
-    let (width, height) = (film.width(), film.height());
-    let spacing = Spacing::new(width, height, spp);
+    let width = film.width();
     let mut rays = RayCounts::default();
-    let mut done = 0;
-    while done < spp && control.stopped().is_none() {
-        let samples = done.clamp(1, MAX_PASS).min(spp - done);
+    let Range {
+        start: mut done,
+        end,
+    } = samples;
+    while done < end && control.stopped().is_none() {
+        let samples = done.clamp(1, MAX_PASS).min(end - done);
         // Only as many tiles are held at a time as keep the threads busy.
         for group in tiles.chunks(1024) {
             let finished: Vec<Option<(Tile, RayCounts)>> = group

@@ -19,6 +19,7 @@ mod emit;
 mod ledger;
 pub mod map;
 mod photon;
+mod progress;
 mod targets;
 mod trace;
 mod uniform;
@@ -27,6 +28,7 @@ pub use emit::{EMISSIONS, EmissionContext, EmissionEntry, EmittedPhoton, PhotonS
 pub use ledger::Ledger;
 pub use map::{IrradianceMap, PhotonMap};
 pub use photon::{Photon, PhotonClass};
+pub use progress::PhotonPass;
 pub use targets::Targets;
 
 use std::time::Instant;
