@@ -117,6 +117,12 @@ pub fn peak_memory() -> Option<u64> {
     Some(kib * 1024)
 }
 
+/// Lets [`peak_memory`] begin anew from what is resident now, where the system can (Linux).
+pub fn reset_peak_memory() {
+    // Where it cannot be, the peak is that of the whole process.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
 /// Processor time of this process so far, all threads together, in seconds (Linux).
 pub fn cpu_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::measure_args::AccuracyArgs;
+use super::measure_args::{AccuracyArgs, BenchArgs};
 use super::values::{self, Crop, Size};
 use crate::report::ErrorMap;
 
@@ -51,6 +51,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Measure what accuracy costs in time: error against seconds, method by method
     Accuracy(AccuracyArgs),
+    /// Measure how fast every stage is, ray tracing backends side by side
+    Bench(BenchArgs),
 }
 
 /// What the numbers of a file's lights mean.

@@ -8,6 +8,7 @@ use clap::Args;
 use super::args::SceneArgs;
 use super::values::{self, Size};
 use crate::report::accuracy::Clock;
+use crate::report::bench::Synthetic;
 
 /// Options of `dualight accuracy`.
 #[derive(Clone, Debug, Args)]
@@ -62,6 +63,45 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "N", value_parser = values::positive_u32)]
     pub threads: Option<u32>,
     /// Print nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Options of `dualight bench`.
+#[derive(Clone, Debug, Args)]
+pub struct BenchArgs {
+    /// glTF scenes (.glb or .gltf)
+    #[arg(value_name = "SCENE", required_unless_present = "synthetic")]
+    pub files: Vec<PathBuf>,
+    /// Made-up scene: terrain, forest, spheres or soup, with a number of primitives. May be given
+    /// several times
+    #[arg(long, value_name = "KIND:N", value_parser = |s: &str| Synthetic::parse(s, values::count))]
+    pub synthetic: Vec<Synthetic>,
+    /// Backends, side by side [default: all but linear]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub accel: Vec<String>,
+    /// Rays of each order
+    #[arg(long, value_name = "N", default_value = "1M", value_parser = values::positive_u32)]
+    pub rays: u32,
+    /// How often everything is measured
+    #[arg(long, value_name = "N", default_value = "5", value_parser = values::positive_u32)]
+    pub repeats: u32,
+    /// Width and height of the pictures
+    #[arg(long, value_name = "N", default_value = "256", value_parser = clap::value_parser!(u32).range(1..=8192))]
+    pub size: u32,
+    /// Numbers of threads; several show how all scales [default: one per processor]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = values::positive_u32)]
+    pub threads: Vec<u32>,
+    /// Seed of rays and photons
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Earlier output of this command to compare with; status 1 if something became worse
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// How much worse something may become
+    #[arg(long, value_name = "PERCENT", default_value = "5%", value_parser = values::percent)]
+    pub tolerance: f64,
+    /// Print nothing but the line for programs, and errors
     #[arg(short, long)]
     pub quiet: bool,
 }

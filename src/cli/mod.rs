@@ -3,6 +3,7 @@
 
 mod accuracy;
 pub mod args;
+mod bench;
 mod compare;
 mod console;
 mod diff;
@@ -62,5 +63,6 @@ pub fn run(cli: &Cli) -> Result<Ending> {
         Command::Diff(args) => diff::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Accuracy(args) => accuracy::run(args),
+        Command::Bench(args) => bench::run(args),
     }
 }

@@ -96,6 +96,16 @@ pub fn factor(s: &str) -> Result<f64, String> {
         .ok_or_else(|| "type a number from 0, for instance 1.5".into())
 }
 
+/// A share: `5%`, or the number alone, in percent.
+///
+/// # Errors
+/// What to type.
+pub fn percent(s: &str) -> Result<f64, String> {
+    factor(s.strip_suffix('%').unwrap_or(s))
+        .map(|x| x / 100.0)
+        .map_err(|_| "type a percentage from 0, for instance 5%".into())
+}
+
 /// A moment, in seconds or frames.
 ///
 /// # Errors

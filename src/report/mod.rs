@@ -2,6 +2,7 @@
 
 pub mod accuracy;
 pub mod agreement;
+pub mod bench;
 pub mod diff;
 mod error_image;
 #[cfg(feature = "flip")]
