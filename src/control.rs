@@ -20,6 +20,10 @@ pub trait Reporter: Send + Sync {
     fn begin(&self, stage: &'static str, unit: &'static str, total: u64);
     /// The current stage has done `done` units so far; may be called from any thread, often.
     fn advance(&self, done: u64);
+    /// How the current stage stands, in words that its counts do not say.
+    fn note(&self, text: &str) {
+        let _ = text;
+    }
     /// The current stage is over.
     fn end(&self);
 }
@@ -86,6 +90,11 @@ impl Control {
         None
     }
 
+    /// When the run stops by itself, if it does.
+    pub fn deadline(&self) -> Option<Instant> {
+        self.deadline
+    }
+
     /// Begins a stage; it ends when the value is dropped.
     pub fn stage(&self, name: &'static str, unit: &'static str, total: u64) -> Stage<'_> {
         self.reporter.begin(name, unit, total);
@@ -107,6 +116,11 @@ impl Stage<'_> {
     pub fn advance(&self, n: u64) {
         let done = self.done.fetch_add(n, Ordering::Relaxed) + n;
         self.control.reporter.advance(done);
+    }
+
+    /// Tells how things stand in words.
+    pub fn note(&self, text: &str) {
+        self.control.reporter.note(text);
     }
 }
 

@@ -1,6 +1,12 @@
 //! From a scene to an image: one call per stage, each with its time.
 
+mod progressive;
+
+pub use progressive::{Progressive, Session, Standing};
+
 use std::time::Instant;
+
+use progressive::Forecast;
 
 use crate::cameras::{framing, with_lens};
 use crate::control::{Control, Stopped};
@@ -8,8 +14,9 @@ use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
 use crate::film::{Component, Film};
 use crate::integrators::{IntegratorSettings, Region, RenderContext, Spacing, camera_pass};
-use crate::photons::{PhotonMaps, PhotonPass, PhotonSettings, trace_photons};
+use crate::photons::{PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons};
 use crate::plugins::Registry;
+use crate::sampling::hash2;
 use crate::scene::Scene;
 use crate::stats::{PhotonCounts, RayCounts, StageTime, Statistics, peak_memory};
 
@@ -30,6 +37,8 @@ pub struct RenderSettings {
     pub height: u32,
     /// Camera samples per pixel.
     pub spp: u32,
+    /// Whether to render in independent passes, whose spread tells the error, and when to end.
+    pub progressive: Option<Progressive>,
     /// Part of the image to render: left, top, right, bottom in pixels; the rest stays black.
     pub crop: Option<[u32; 4]>,
     /// Name of the camera; `None` for the first.
@@ -50,6 +59,7 @@ impl Default for RenderSettings {
             width: 512,
             height: 512,
             spp: 16,
+            progressive: None,
             crop: None,
             camera: None,
             threads: None,
@@ -81,8 +91,27 @@ pub fn render(
     registry: &Registry,
     control: &Control,
 ) -> Result<Rendering> {
+    let session = Session {
+        film: None,
+        seconds: 0.0,
+        watch: &mut |_, _| {},
+    };
+    render_session(scene, settings, registry, control, session)
+}
+
+/// Renders a scene, going on from a film if there is one, and lets the film be seen meanwhile.
+///
+/// # Errors
+/// As [`render`]; a film of another size.
+pub fn render_session(
+    scene: &Scene,
+    settings: &RenderSettings,
+    registry: &Registry,
+    control: &Control,
+    session: Session<'_>,
+) -> Result<Rendering> {
     in_pool(settings.threads, || {
-        render_in_pool(scene, settings, registry, control)
+        render_in_pool(scene, settings, registry, control, session)
     })?
 }
 
@@ -104,6 +133,7 @@ fn render_in_pool(
     settings: &RenderSettings,
     registry: &Registry,
     control: &Control,
+    session: Session<'_>,
 ) -> Result<Rendering> {
     let mut clock = Clock::default();
     let options = &settings.integrator_settings;
@@ -143,19 +173,53 @@ fn render_in_pool(
         && effects
             .set
             .intersects(EffectSet::CAUSTICS | EffectSet::INDIRECT);
-    let mut film = Film::new(settings.width, settings.height);
+    let mut film = match session.film {
+        Some(film) if (film.width(), film.height()) == (settings.width, settings.height) => film,
+        Some(_) => {
+            return Err(Error::Usage(
+                "the film to go on from has another size".into(),
+            ));
+        }
+        None => Film::new(settings.width, settings.height),
+    };
     film.keep(&components(effects.set));
-    let spacing = Spacing::new(settings.width, settings.height, settings.spp);
+    // What is not known before must not be seen in the filtering of textures.
+    let spacing_spp = match &settings.progressive {
+        Some(_) => SAMPLES_PER_PASS,
+        None => settings.spp,
+    };
+    let spacing = Spacing::new(settings.width, settings.height, spacing_spp);
     let mut rays = RayCounts::default();
     let [mut global_photons, mut caustic_photons] = [PhotonCounts::default(); 2];
-    let mut passes = 0;
-    let mut done = 0;
-    while done < settings.spp && control.stopped().is_none() {
+    let target = settings.progressive.as_ref().and_then(|p| p.target_error);
+    let in_passes = settings.progressive.is_some();
+    if in_passes {
+        film.count_passes();
+    }
+    // Passes of known number have a bar each, others one for all.
+    let silent = control.silent();
+    let inner = if in_passes { &silent } else { control };
+    let whole = in_passes.then(|| control.stage("render", "samples", 0));
+    let mut passes = film.passes();
+    let mut done = film.finished_samples();
+    let forecast = Forecast::new(
+        target,
+        settings.spp,
+        control.deadline(),
+        (done, session.seconds),
+    );
+    let mut standing = forecast.standing(&film, done, true);
+    while done < settings.spp && control.stopped().is_none() && !standing.reached(target) {
         let mut samples = settings.spp - done;
         let mut maps = PhotonMaps::default();
-        if wanted {
-            let pass = PhotonPass::new(&first, passes);
+        let pass = match in_passes {
+            true => progressive::pass(&first, passes),
+            false => PhotonPass::new(&first, SAMPLES_PER_PASS, passes),
+        };
+        if wanted || in_passes {
             samples = samples.min(pass.samples);
+        }
+        if wanted {
             let gather = options.gather_rays > 0;
             maps = trace_photons(
                 scene,
@@ -164,7 +228,7 @@ fn render_in_pool(
                 effects.set,
                 &pass.photons,
                 gather,
-                control,
+                inner,
             );
             global_photons.add_pass(&maps.global_counts, passes);
             caustic_photons.add_pass(&maps.caustic_counts, passes);
@@ -179,21 +243,37 @@ fn render_in_pool(
             settings: options,
         };
         let integrator = (integrator.build)(context);
+        // Independent passes have their own random numbers; others go on in the same sequence.
+        let (seed, range) = match in_passes {
+            true => (hash2(options.seed, u64::from(passes)), 0..samples),
+            false => (options.seed, done..done + samples),
+        };
         let camera_rays = camera_pass(
             &*camera,
             &*integrator,
-            options.seed,
-            done..done + samples,
+            seed,
+            range,
             &spacing,
             !scene.textures.is_empty(),
             region,
             &mut film,
-            control,
+            &mut |film| (session.watch)(film, &forecast.standing(film, done, false)),
+            inner,
         );
         rays.add(&camera_rays);
         clock.lap("pixels");
+        if in_passes && control.stopped().is_some() {
+            // What the pass lacks can be taken later.
+            break;
+        }
         done += samples;
         passes += 1;
+        if let Some(whole) = &whole {
+            film.finish_pass();
+            standing = forecast.standing(&film, done, true);
+            whole.note(&standing.text());
+            (session.watch)(&film, &standing);
+        }
     }
 
     let built = accel.stats();
@@ -209,6 +289,7 @@ fn render_in_pool(
             accelerator: built.backend,
             accelerator_bytes: built.bytes,
             peak_memory_bytes: peak_memory(),
+            estimated_error: film.estimated_error(),
         },
         film,
         stopped: control.stopped(),

@@ -107,6 +107,8 @@ pub struct Statistics {
     pub accelerator_bytes: u64,
     /// Largest resident size of the process in bytes, where the system tells it.
     pub peak_memory_bytes: Option<u64>,
+    /// Estimated relative mean squared error, if passes were kept apart.
+    pub estimated_error: Option<f64>,
 }
 
 /// Largest resident size of this process so far, in bytes (Linux: `VmHWM`).

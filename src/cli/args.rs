@@ -150,10 +150,10 @@ pub struct RenderArgs {
     /// Size of the image in pixels [default: 512 wide, as high as the camera asks for]
     #[arg(long, value_name = "WxH", help_heading = "Image")]
     pub size: Option<Size>,
-    /// Camera samples per pixel
-    #[arg(long, value_name = "N", default_value = "16", value_parser = values::positive_u32)]
+    /// Camera samples per pixel [default: 16; no limit with --target-error]
+    #[arg(long, value_name = "N", value_parser = values::positive_u32)]
     #[arg(help_heading = "Image")]
-    pub spp: u32,
+    pub spp: Option<u32>,
     /// Camera to look through; auto frames the whole scene [default: the first of the scene]
     #[arg(long, value_name = "NAME", help_heading = "Image")]
     pub camera: Option<String>,
@@ -211,8 +211,17 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = values::positive_u32, help_heading = "Machine")]
     pub threads: Option<u32>,
     /// Stop after 30s, 5m or 1h with the image as it is then (exit status 4)
-    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Machine")]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Ending")]
     pub time_limit: Option<Duration>,
+    /// Stop when the image's relMSE, estimated from independent passes, is this small
+    #[arg(long, value_name = "E", value_parser = values::error, help_heading = "Ending")]
+    pub target_error: Option<f64>,
+    /// Write the images, and the film of --resume, so often while rendering in passes
+    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Ending")]
+    pub write_every: Option<Duration>,
+    /// Keep the film in FILE, and go on from it if it is there already
+    #[arg(long, value_name = "FILE", help_heading = "Ending")]
+    pub resume: Option<PathBuf>,
 }
 
 /// Options of `dualight inspect`.
@@ -376,7 +385,10 @@ mod tests {
         else {
             panic!("not understood");
         };
-        assert_eq!((r.outputs.len(), r.spp, r.exposure), (2, 10_000, -1.5));
+        assert_eq!(
+            (r.outputs.len(), r.spp, r.exposure),
+            (2, Some(10_000), -1.5)
+        );
         assert_eq!(r.effects.as_deref(), Some("-caustics,+direct"));
         assert_eq!((r.gather, r.photons), (Some(0), Some(2_000_000)));
         assert_eq!(r.json, Some(None));

@@ -9,6 +9,7 @@ mod console;
 mod diff;
 mod format;
 mod inspect;
+mod keep;
 mod machine;
 pub mod measure_args;
 pub mod plan;

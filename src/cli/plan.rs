@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits};
 use crate::integrators::IntegratorSettings;
 use crate::output::{self, OutputSettings};
-use crate::pipeline::RenderSettings;
+use crate::pipeline::{Progressive, RenderSettings};
 use crate::plugins::Registry;
 use crate::scene::Scene;
 
@@ -19,6 +19,9 @@ const DEFAULT_WIDTH: u32 = 512;
 
 /// Largest height that a camera's aspect leads to; who wants more gives a size.
 const MAX_DEFAULT_HEIGHT: f64 = 8192.0;
+
+/// Time between two writings of a rendering in passes, if not said.
+const WRITE_EVERY: Duration = Duration::from_secs(60);
 
 /// Frames in a second where nothing else is said: Blender's default.
 const DEFAULT_FPS: f64 = 24.0;
@@ -47,6 +50,10 @@ pub struct Plan {
     pub statistics: Option<StatisticsTarget>,
     /// When to stop, from the start of the command.
     pub time_limit: Option<Duration>,
+    /// How often to write what there is while rendering in passes.
+    pub write_every: Duration,
+    /// Where the film is kept, if anywhere.
+    pub resume: Option<PathBuf>,
     /// Whether to print nothing but errors.
     pub quiet: bool,
     size: Option<Size>,
@@ -83,6 +90,8 @@ impl Plan {
                 Some(path) => StatisticsTarget::File(path.clone()),
             }),
             time_limit: args.time_limit,
+            write_every: args.write_every.unwrap_or(WRITE_EVERY),
+            resume: args.resume.clone(),
             quiet: args.quiet,
             size: args.size,
             settings: RenderSettings {
@@ -92,7 +101,11 @@ impl Plan {
                 effects,
                 width: 0,
                 height: 0,
-                spp: args.spp,
+                spp: args.spp.unwrap_or(match args.target_error {
+                    Some(_) => u32::MAX,
+                    None => RenderSettings::default().spp,
+                }),
+                progressive: progressive(args),
                 crop: args.crop.map(|c| c.0),
                 camera: args.camera.clone(),
                 threads: args.threads.map(|n| n as usize),
@@ -146,6 +159,17 @@ impl Plan {
             _ => Ok(()),
         }
     }
+}
+
+/// Whether to render in independent passes: for whoever asks for what only they can give.
+fn progressive(args: &RenderArgs) -> Option<Progressive> {
+    let wanted = args.target_error.is_some()
+        || args.time_limit.is_some()
+        || args.write_every.is_some()
+        || args.resume.is_some();
+    wanted.then_some(Progressive {
+        target_error: args.target_error,
+    })
 }
 
 /// How a scene's file is to be read.

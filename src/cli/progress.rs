@@ -39,7 +39,8 @@ pub struct Bars {
 impl Reporter for Bars {
     fn begin(&self, stage: &'static str, unit: &'static str, total: u64) {
         let bar = if total == 0 {
-            ProgressBar::new_spinner().with_style(style("{prefix:>12} {spinner} {elapsed}", unit))
+            ProgressBar::new_spinner()
+                .with_style(style("{prefix:>12} {spinner} {elapsed} {msg}", unit))
         } else {
             ProgressBar::new(total).with_style(style(
                 "{prefix:>12} {bar:32} {percent:>3}%  {rate}  {left}",
@@ -60,6 +61,12 @@ impl Reporter for Bars {
             && let Ok(Some(bar)) = self.current.try_lock().as_deref()
         {
             bar.set_position(done);
+        }
+    }
+
+    fn note(&self, text: &str) {
+        if let Some(bar) = &*lock(&self.current) {
+            bar.set_message(text.to_owned());
         }
     }
 
@@ -113,6 +120,19 @@ impl Lines {
     }
 }
 
+impl Lines {
+    /// Whether the next line is due. Of the threads that see that it is, one may speak.
+    fn is_time(&self) -> bool {
+        let now = self.epoch.elapsed().as_millis() as u64;
+        let due = self.due.load(Ordering::Relaxed);
+        let next = now + self.interval.as_millis() as u64;
+        now >= due
+            && (self.due)
+                .compare_exchange(due, next, Ordering::Relaxed, Ordering::Relaxed)
+                .is_ok()
+    }
+}
+
 impl Reporter for Lines {
     fn begin(&self, stage: &'static str, unit: &'static str, total: u64) {
         lock(&self.out).1 = Some(Running {
@@ -124,15 +144,7 @@ impl Reporter for Lines {
     }
 
     fn advance(&self, done: u64) {
-        let now = self.epoch.elapsed().as_millis() as u64;
-        let due = self.due.load(Ordering::Relaxed);
-        let next = now + self.interval.as_millis() as u64;
-        // Of the threads that see that it is time, one speaks.
-        if now < due
-            || (self.due)
-                .compare_exchange(due, next, Ordering::Relaxed, Ordering::Relaxed)
-                .is_err()
-        {
+        if !self.is_time() {
             return;
         }
         let mut guard = lock(&self.out);
@@ -140,6 +152,18 @@ impl Reporter for Lines {
         if let Some(r) = running {
             // A closed standard error must not end the rendering.
             let _ = out.write_all(r.line(done, r.start.elapsed()).as_bytes());
+        }
+    }
+
+    fn note(&self, text: &str) {
+        if !self.is_time() {
+            return;
+        }
+        let mut guard = lock(&self.out);
+        let (out, running) = &mut *guard;
+        if let Some(r) = running {
+            let line = format!("dualight: {}: {text}\n", r.stage);
+            let _ = out.write_all(line.as_bytes());
         }
     }
 

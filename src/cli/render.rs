@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::args::RenderArgs;
+use super::keep::Keeper;
 use super::plan::{Plan, StatisticsTarget};
 use super::summary::{self, Summary};
 use super::{Ending, console, progress, signal};
@@ -12,8 +13,8 @@ use crate::control::{Control, Stopped};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::import;
-use crate::output::{self, Metadata};
-use crate::pipeline::{self, RenderSettings, Rendering};
+use crate::output;
+use crate::pipeline::{self, RenderSettings, Rendering, Session};
 use crate::plugins::Registry;
 use crate::stats::StageTime;
 
@@ -46,7 +47,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
     if let Some(why) = control.stopped() {
         return Ok(nothing(why));
     }
-    let mut rendering = pipeline::render(&scene, &settings, &registry, &control)?;
+    let mut keeper = Keeper::new(&plan, &settings, &registry, start)?;
+    let earlier = keeper.earlier()?;
+    let session = Session {
+        seconds: earlier.as_ref().map_or(0.0, |c| c.seconds),
+        film: earlier.map(|c| c.film),
+        watch: &mut |film, standing| keeper.watch(film, standing),
+    };
+    let mut rendering = pipeline::render_session(&scene, &settings, &registry, &control, session)?;
     // Memory is wanted for the image now.
     drop(scene);
     rendering.statistics.stages.insert(
@@ -62,22 +70,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
     }
 
     let writing = Instant::now();
-    let metadata = Metadata {
-        command_line: command_line(),
-        seed: settings.integrator_settings.seed,
-        spp: most,
-        render_seconds: start.elapsed().as_secs_f64(),
-    };
-    let image = rendering.film.develop();
-    for path in &plan.outputs {
-        output::write(
-            &registry.outputs,
-            &image,
-            &plan.output_settings,
-            &metadata,
-            path,
-        )?;
-    }
+    let metadata = keeper.write(&rendering.film)?;
     rendering.statistics.stages.push(StageTime {
         stage: "write",
         seconds: writing.elapsed().as_secs_f64(),
@@ -116,6 +109,7 @@ fn check_targets(plan: &Plan) -> Result<()> {
         Some(StatisticsTarget::File(path)) => Some(path),
         _ => None,
     });
+    let files = files.chain(&plan.resume);
     let real = |p: &Path| p.canonicalize().ok();
     let scene = real(&plan.scene);
     for path in files {
@@ -152,12 +146,19 @@ fn stop_notice(
         Stopped::Interrupted => "interrupted",
         Stopped::TimeLimit => "stopped at the time limit",
     };
-    let asked = settings.spp;
+    let error = match rendering.statistics.estimated_error {
+        Some(e) => format!(", relMSE about {e:.2e}"),
+        None => String::new(),
+    };
+    let asked = match settings.spp {
+        u32::MAX => String::new(),
+        n => format!(" of {n}"),
+    };
     match unsampled(&rendering.film, settings.crop) {
         0 if settings.crop.is_some() => {
-            format!("{why}: at most {most} of {asked} samples per pixel")
+            format!("{why}: at most {most}{asked} samples per pixel{error}")
         }
-        0 => format!("{why}: {fewest} to {most} of {asked} samples per pixel"),
+        0 => format!("{why}: {fewest} to {most}{asked} samples per pixel{error}"),
         n => format!("{why}: {n} pixels have no sample and are black"),
     }
 }

@@ -64,6 +64,12 @@ pub(super) fn table(s: &Summary) -> String {
     if caustic.emitted > 0 {
         rows.push(("caustic map", photons(caustic)));
     }
+    if let Some(e) = statistics.estimated_error {
+        rows.push((
+            "error",
+            format!("relMSE about {e:.2e}, from independent passes"),
+        ));
+    }
     let peak = statistics.peak_memory_bytes.map_or("unknown".into(), bytes);
     rows.push((
         "memory",
@@ -144,7 +150,8 @@ pub(super) fn json(s: &Summary) -> String {
             "effects": r.effects,
             "width": r.width,
             "height": r.height,
-            "spp": r.spp,
+            "spp": (r.spp != u32::MAX).then_some(r.spp),
+            "target_error": r.progressive.as_ref().and_then(|p| p.target_error),
             "crop": r.crop,
             "camera": r.camera,
             "threads": r.threads,

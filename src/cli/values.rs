@@ -106,6 +106,17 @@ pub fn percent(s: &str) -> Result<f64, String> {
         .map_err(|_| "type a percentage from 0, for instance 5%".into())
 }
 
+/// A relative squared error to be reached.
+///
+/// # Errors
+/// What to type.
+pub fn error(s: &str) -> Result<f64, String> {
+    s.parse()
+        .ok()
+        .filter(|x| (1e-12..=1e6).contains(x))
+        .ok_or_else(|| "type an error above 0, for instance 0.001".into())
+}
+
 /// A moment, in seconds or frames.
 ///
 /// # Errors

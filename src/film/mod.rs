@@ -1,6 +1,8 @@
 //! The film: what pixels have gathered, as named layers. Knows radiance, nothing of scenes.
 
 mod layer;
+mod passes;
+mod state;
 
 pub use layer::{Channel, Image, Layer};
 
@@ -114,6 +116,7 @@ pub struct Film {
     rejected: u64,
     first_rejected: Option<[u32; 2]>,
     kept: [bool; 4],
+    passes: Option<passes::Passes>,
 }
 
 impl Film {
@@ -128,12 +131,63 @@ impl Film {
             rejected: 0,
             first_rejected: None,
             kept: [true; 4],
+            passes: None,
         }
     }
 
     /// Keeps only these components of what is added from now on.
     pub fn keep(&mut self, components: &[Component]) {
         self.kept = Component::ALL.map(|c| components.contains(&c));
+    }
+
+    /// Keeps passes apart from now on, which tells the error of the image.
+    pub fn count_passes(&mut self) {
+        self.passes
+            .get_or_insert_with(|| passes::Passes::new(self.counts.len()));
+    }
+
+    /// Ends a pass: what is added from now on is independent of what was added so far.
+    pub fn finish_pass(&mut self) {
+        if let Some(p) = &mut self.passes {
+            p.finish(&self.sums, &self.counts);
+        }
+    }
+
+    /// Finished passes.
+    pub fn passes(&self) -> u32 {
+        self.passes.as_ref().map_or(0, |p| p.finished)
+    }
+
+    /// Samples per pixel of the finished passes.
+    pub fn finished_samples(&self) -> u32 {
+        let Some(p) = &self.passes else {
+            return 0;
+        };
+        let own = self.counts.iter().zip(&p.current);
+        // A pixel that lacks some had a sum that was no number.
+        own.map(|(all, (_, n))| all.saturating_sub(*n))
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Samples that a pixel has of the pass under way.
+    pub fn samples_of_pass(&self, x: u32, y: u32) -> u32 {
+        let i = y as usize * self.width as usize + x as usize;
+        self.passes.as_ref().map_or(0, |p| p.current[i].1)
+    }
+
+    /// Estimated relative mean squared error, as far as passes differ; `None` before the second.
+    pub fn estimated_error(&self) -> Option<f64> {
+        let passes = self.passes.as_ref()?;
+        passes.relative_error(&self.all_sums())
+    }
+
+    fn all_sums(&self) -> passes::Sums<'_> {
+        passes::Sums {
+            totals: &self.sums,
+            counts: &self.counts,
+            width: self.width as usize,
+        }
     }
 
     /// Width in pixels.
@@ -172,6 +226,9 @@ impl Film {
                     *a += v;
                 }
                 self.counts[i] += tile.samples;
+                if let Some(p) = &mut self.passes {
+                    p.add(i, &values, tile.samples);
+                }
             } else {
                 self.rejected += 1;
                 let at = [tile.x + dx, tile.y + dy];
@@ -211,7 +268,7 @@ impl Film {
                 .map(|(c, n)| channel(n, true, &|s| f(s, c)))
                 .collect(),
         };
-        let mut beauty = rgb("", &|s, c| s[c] + s[3 + c] + s[6 + c] + s[9 + c]);
+        let mut beauty = rgb("", &|s, c| passes::beauty(s)[c]);
         beauty.channels.push(channel("A", true, &|s| s[24]));
         let mut layers = vec![beauty];
         for (k, component) in Component::ALL.into_iter().enumerate() {
@@ -239,6 +296,22 @@ impl Film {
                 channel("caustic", false, &|s| s[23]),
             ],
         });
+        let passes = self.passes.as_ref();
+        let half_widths = passes.and_then(|p| p.half_widths(&self.all_sums()));
+        layers.extend(half_widths.map(|w| {
+            Layer {
+                name: "error".into(),
+                channels: ["R", "G", "B"]
+                    .iter()
+                    .enumerate()
+                    .map(|(c, name)| Channel {
+                        name: (*name).into(),
+                        half: false,
+                        data: w.iter().map(|v| v[c]).collect(),
+                    })
+                    .collect(),
+            }
+        }));
         Image {
             width: self.width,
             height: self.height,

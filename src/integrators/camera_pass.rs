@@ -47,8 +47,9 @@ impl Region {
 }
 
 /// Takes the samples of these numbers in every pixel of `region` and adds them to the film, until
-/// done or stopped. Rays carry differentials if `differentials` are wanted. Returns the rays
-/// traced.
+/// done or stopped. Samples of this pass that a pixel has already, of a run that was interrupted,
+/// are not taken again. Rays carry differentials if `differentials` are wanted; `watch` sees the
+/// film now and then. Returns the rays traced.
 #[expect(clippy::too_many_arguments, reason = "plain input, each used once")]
 pub fn camera_pass(
     camera: &dyn Camera,
@@ -59,6 +60,7 @@ pub fn camera_pass(
     differentials: bool,
     region: Region,
     film: &mut Film,
+    watch: &mut dyn FnMut(&Film),
     control: &Control,
 ) -> RayCounts {
     let pixels = u64::from(region.x1 - region.x0) * u64::from(region.y1 - region.y0);
@@ -66,20 +68,22 @@ pub fn camera_pass(
     let tiles = region.tiles();
     let width = film.width();
     let mut rays = RayCounts::default();
-    let Range {
-        start: mut done,
-        end,
-    } = samples;
+    let Range { start, end } = samples;
+    let mut done = start;
     while done < end && control.stopped().is_none() {
         let samples = done.clamp(1, MAX_PASS).min(end - done);
         // Only as many tiles are held at a time as keep the threads busy.
         for group in tiles.chunks(1024) {
+            let seen = &*film;
             let finished: Vec<Option<(Tile, RayCounts)>> = group
                 .par_iter()
                 .map(|&(x, y, w, h)| {
                     if control.stopped().is_some() {
                         return None;
                     }
+                    let own = |i: u32| seen.samples_of_pass(x + i % w, y + i / w);
+                    let first = done.max(start + (0..w * h).map(own).max().unwrap_or(0));
+                    let samples = (done + samples).checked_sub(first).filter(|n| *n > 0)?;
                     let mut scratch = Scratch::default();
                     let mut sums = vec![PixelSample::default(); (w * h) as usize];
                     let mut batch = ArrayVec::<Sample, BATCH>::new();
@@ -95,7 +99,7 @@ pub fn camera_pass(
                             take(&mut batch);
                         }
                         let key = u64::from(py) * u64::from(width) + u64::from(px);
-                        for s in done..done + samples {
+                        for s in first..first + samples {
                             let mut sampler = Sampler::new(seed, stream::CAMERA, key, u64::from(s));
                             let [jx, jy] = sampler.next_2d();
                             let (x, y) = (f64::from(px) + jx, f64::from(py) + jy);
@@ -133,6 +137,7 @@ pub fn camera_pass(
                 film.add(&tile);
                 rays.add(&r);
             }
+            watch(film);
         }
         done += samples;
     }

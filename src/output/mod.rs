@@ -3,10 +3,12 @@
 //! atomically.
 
 mod atomic;
+mod checkpoint;
 mod exr;
 mod png;
 
 pub use atomic::{check_writable, discard_unfinished, write_atomically};
+pub use checkpoint::{Checkpoint, fingerprint};
 pub use exr::read;
 pub use png::display_bytes;
 

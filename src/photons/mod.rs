@@ -28,7 +28,7 @@ pub use emit::{EMISSIONS, EmissionContext, EmissionEntry, EmittedPhoton, PhotonS
 pub use ledger::Ledger;
 pub use map::{IrradianceMap, PhotonMap};
 pub use photon::{Photon, PhotonClass};
-pub use progress::PhotonPass;
+pub use progress::{PhotonPass, SAMPLES as SAMPLES_PER_PASS};
 pub use targets::Targets;
 
 use std::time::Instant;

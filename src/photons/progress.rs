@@ -13,8 +13,8 @@
 use super::PhotonSettings;
 use crate::sampling::hash2;
 
-/// Camera samples of a pixel that share the photons of the first pass.
-const SAMPLES: u32 = 16;
+/// Camera samples of a pixel that share the photons of the first pass, if it is to be efficient.
+pub const SAMPLES: u32 = 16;
 
 /// A pass.
 #[derive(Clone, Debug)]
@@ -26,8 +26,9 @@ pub struct PhotonPass {
 }
 
 impl PhotonPass {
-    /// The pass of a number, counted from 0. `first` is the first one's settings.
-    pub fn new(first: &PhotonSettings, number: u32) -> Self {
+    /// The pass of a number, counted from 0. `first` is the first one's settings, whose photons
+    /// serve `samples` camera samples of a pixel.
+    pub fn new(first: &PhotonSettings, samples: u32, number: u32) -> Self {
         let growth = f64::from(number + 1).sqrt();
         let grown = |n: u64| (n as f64 * growth) as u64;
         Self {
@@ -40,7 +41,7 @@ impl PhotonPass {
                 caustic: grown(first.caustic),
                 ..first.clone()
             },
-            samples: (f64::from(SAMPLES) * growth) as u32,
+            samples: (f64::from(samples) * growth) as u32,
         }
     }
 }
@@ -59,7 +60,7 @@ mod tests {
             max_depth: None,
             roulette: true,
         };
-        let pass = |n| PhotonPass::new(&first, n);
+        let pass = |n| PhotonPass::new(&first, SAMPLES, n);
         assert_eq!((pass(0).samples, pass(0).photons.seed), (16, 7));
         assert_eq!((pass(3).samples, pass(3).photons.global), (32, 2000));
         assert_eq!((pass(99).samples, pass(99).photons.caustic), (160, 1000));

@@ -1,0 +1,188 @@
+//! Rendering until the image is good enough: independent passes, whose spread tells the error.
+
+use std::time::{Duration, Instant};
+
+use crate::film::Film;
+use crate::photons::{PhotonPass, PhotonSettings, SAMPLES_PER_PASS};
+
+/// Samples of a pixel in the first pass. Later ones grow, see [`PhotonPass`].
+const FIRST: u32 = 4;
+
+/// Fewest photons in a kernel.
+const FEWEST_NEAREST: usize = 8;
+
+/// When a rendering in independent passes ends, besides by its samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Progressive {
+    /// At this estimated relative mean squared error.
+    pub target_error: Option<f64>,
+}
+
+/// What a rendering in passes is told by whoever waits for it.
+pub struct Session<'a> {
+    /// The film to go on from, of the same settings.
+    pub film: Option<Film>,
+    /// Seconds that this film took.
+    pub seconds: f64,
+    /// Sees the film now and then.
+    pub watch: &'a mut (dyn FnMut(&Film, &Standing) + Send),
+}
+
+/// How far a rendering in passes is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Standing {
+    /// Whether a pass has just ended.
+    pub at_end_of_pass: bool,
+    /// Samples per pixel of the finished passes.
+    pub samples: u32,
+    /// Estimated relative mean squared error of the image, once two passes are finished.
+    pub error: Option<f64>,
+    /// Samples per pixel that it will have when it is done, by estimate.
+    pub samples_needed: Option<f64>,
+    /// Seconds of rendering so far, those before it was resumed included.
+    pub seconds: f64,
+    /// Seconds that are left, by estimate.
+    pub seconds_left: Option<f64>,
+}
+
+/// The pass of a number: smaller than in a rendering of known length, so that there are several
+/// soon; fewer photons in a kernel, by the balance of noise and bias.
+pub(super) fn pass(settings: &PhotonSettings, number: u32) -> PhotonPass {
+    let share = f64::from(FIRST) / f64::from(SAMPLES_PER_PASS);
+    let part = |n: u64| (n as f64 * share) as u64;
+    let nearest = (settings.nearest as f64 * share.powf(2.0 / 3.0)).round() as usize;
+    let first = PhotonSettings {
+        global: part(settings.global).max(1),
+        caustic: part(settings.caustic).max(1),
+        nearest: nearest.max(FEWEST_NEAREST.min(settings.nearest)),
+        ..settings.clone()
+    };
+    PhotonPass::new(&first, FIRST, number)
+}
+
+/// Watches the clock and the error.
+pub(super) struct Forecast {
+    target: Option<f64>,
+    limit: u32,
+    deadline: Option<Instant>,
+    start: Instant,
+    /// Samples per pixel and seconds that were there already.
+    before: (u32, f64),
+}
+
+impl Forecast {
+    pub(super) fn new(
+        target: Option<f64>,
+        limit: u32,
+        deadline: Option<Instant>,
+        before: (u32, f64),
+    ) -> Self {
+        Self {
+            target,
+            limit,
+            deadline,
+            start: Instant::now(),
+            before,
+        }
+    }
+
+    /// How things stand.
+    pub(super) fn standing(&self, film: &Film, samples: u32, at_end_of_pass: bool) -> Standing {
+        let error = at_end_of_pass.then(|| film.estimated_error()).flatten();
+        let own = self.start.elapsed().as_secs_f64();
+        // The squared error falls as one over the samples.
+        let by_error = match (self.target, error) {
+            (Some(target), Some(error)) => Some(f64::from(samples) * error / target),
+            _ => None,
+        };
+        let by_limit = (self.limit != u32::MAX).then(|| f64::from(self.limit));
+        let needed = [by_error, by_limit].into_iter().flatten().reduce(f64::min);
+        let taken = samples.saturating_sub(self.before.0);
+        let by_samples = needed
+            .filter(|_| taken > 0)
+            .map(|n| (n - f64::from(samples)).max(0.0) * own / f64::from(taken));
+        let by_clock = self
+            .deadline
+            .map(|d| d.saturating_duration_since(Instant::now()).as_secs_f64());
+        Standing {
+            at_end_of_pass,
+            samples,
+            error,
+            samples_needed: needed,
+            seconds: self.before.1 + own,
+            seconds_left: [by_samples, by_clock]
+                .into_iter()
+                .flatten()
+                .reduce(f64::min),
+        }
+    }
+}
+
+impl Standing {
+    /// Whether the image is good enough.
+    pub(super) fn reached(&self, target: Option<f64>) -> bool {
+        matches!((self.error, target), (Some(e), Some(t)) if e <= t)
+    }
+
+    /// In words.
+    pub(super) fn text(&self) -> String {
+        let mut out = format!("{} samples per pixel", self.samples);
+        if let Some(e) = self.error {
+            out += &format!(", relMSE about {e:.2e}");
+        }
+        if let Some(left) = self.seconds_left {
+            let left = Duration::try_from_secs_f64(left).unwrap_or(Duration::MAX);
+            out += &match left.as_secs() {
+                s @ 0..60 => format!(", {s} s left"),
+                s @ 60..3600 => format!(", {} min {} s left", s / 60, s % 60),
+                s => format!(", {} h {} min left", s / 3600, s / 60 % 60),
+            };
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings() -> PhotonSettings {
+        PhotonSettings {
+            seed: 1,
+            global: 1600,
+            caustic: 0,
+            nearest: 50,
+            max_depth: None,
+            roulette: true,
+        }
+    }
+
+    #[test]
+    fn passes_are_a_quarter_of_those_of_a_known_length() {
+        let p = pass(&settings(), 0);
+        assert_eq!(
+            (p.samples, p.photons.global, p.photons.caustic),
+            (4, 400, 1)
+        );
+        assert_eq!(p.photons.nearest, 20);
+        assert_eq!(pass(&settings(), 3).samples, 8);
+        let few = PhotonSettings {
+            nearest: 5,
+            ..settings()
+        };
+        assert_eq!(pass(&few, 0).photons.nearest, 5);
+    }
+
+    #[test]
+    fn a_standing_is_told_in_words() {
+        let s = Standing {
+            samples: 12,
+            error: Some(0.0123),
+            seconds_left: Some(75.0),
+            ..Default::default()
+        };
+        let text = "12 samples per pixel, relMSE about 1.23e-2, 1 min 15 s left";
+        assert_eq!(s.text(), text);
+        assert!(s.reached(Some(0.02)) && !s.reached(Some(0.01)) && !s.reached(None));
+    }
+}
