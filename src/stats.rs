@@ -36,6 +36,8 @@ impl RayCounts {
 pub struct PhotonCounts {
     /// Photons that left lights.
     pub emitted: u64,
+    /// More photons that decided the kernels and were not stored.
+    pub pilot: u64,
     /// Rays traced to plan the emission.
     pub checked: u64,
     /// Cells that it was planned in.
@@ -59,6 +61,7 @@ impl PhotonCounts {
     /// flux is the mean of the passes, each of which carries all of it.
     pub fn add_pass(&mut self, o: &Self, passes: u32) {
         self.emitted += o.emitted;
+        self.pilot += o.pilot;
         self.checked += o.checked;
         self.cells += o.cells;
         self.stored += o.stored;

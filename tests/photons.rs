@@ -7,6 +7,7 @@
 mod common;
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use common::stats::Samples;
 use common::{add_quad, add_room, add_sphere, box_scene, glass, lambert, lamp, light, mirror};
@@ -16,7 +17,7 @@ use dualight::control::Control;
 use dualight::effects::EffectSet;
 use dualight::lights::LightDesc;
 use dualight::math::DVec3;
-use dualight::photons::map::{Estimate, Nearest, Site};
+use dualight::photons::map::{Estimate, Nearest, Pilot, Site, Surroundings};
 use dualight::photons::{
     EMISSIONS, IrradianceMap, Photon, PhotonClass, PhotonMap, PhotonMaps, PhotonSettings,
     trace_photons,
@@ -261,7 +262,7 @@ fn even(n: usize, x0: f64, seed: u64) -> Vec<Photon> {
 
 fn estimate(map: &PhotonMap, p: DVec3, ng: DVec3) -> Estimate {
     let mut found = Nearest::new();
-    map.estimate(&Site::new(p, ng), &mut found, |_| true, |_| Rgb::ONE)
+    map.estimate_nearest(&Site::new(p, ng), &mut found, |_| true, |_| Rgb::ONE)
 }
 
 #[test]
@@ -339,6 +340,8 @@ fn kernels_do_not_reach_through_a_wall() {
 #[test]
 fn extremes_of_gathering_are_defined() {
     let one = |p: DVec3| Photon::new(p, DVec3::Y, DVec3::Y, Rgb::ONE, PhotonClass::Direct);
+    let empty = scene(|_| ());
+    let accel = (ACCELERATORS[0].build)(&empty.geometry, 1).expect("built");
     let cases: [(&str, Vec<Photon>); 4] = [
         ("none", vec![]),
         ("one", vec![one(DVec3::ZERO)]),
@@ -360,7 +363,17 @@ fn extremes_of_gathering_are_defined() {
                 if k > 50 {
                     continue; // Irradiance at every fourth photon from all of them takes long.
                 }
-                let irradiance = IrradianceMap::build(&map, |_| true, &Control::default());
+                let deciding = Pilot {
+                    around: Surroundings {
+                        scene: &empty,
+                        accel: &*accel,
+                    },
+                    nearest: k,
+                    ratio: 1.0,
+                };
+                let control = Control::default();
+                let kernels = deciding.kernels(photons.clone(), area, |_| true, &control);
+                let irradiance = IrradianceMap::build(&map, Arc::new(kernels), |_| true, &control);
                 let site = Site::new(DVec3::ZERO, DVec3::Y);
                 let near = irradiance.nearest(&site, &mut Nearest::new());
                 assert!(

@@ -95,7 +95,7 @@ impl PhotonMapping<'_> {
         }
 
         // The caustic map.
-        let stored = Stored { maps: cx.maps };
+        let stored = Stored::new(cx);
         let sites = sites(sp, bsdf);
         if let Some(map) = &cx.maps.caustic {
             let e = stored.density(map, &sites, bsdf, |_| true, scratch);
@@ -244,15 +244,14 @@ impl PhotonMapping<'_> {
         steps: u32,
     ) -> Rgb {
         let cx = &self.cx;
-        let stored = Stored { maps: cx.maps };
+        let stored = Stored::new(cx);
         let sites = sites(sp, bsdf);
         let near = stored.irradiance(&sites[0], scratch);
         let radius = near.map_or(0.0, |s| f64::from(s.radius));
         if sp.distance >= NEAR * radius || steps >= NEAR_STEPS {
             return match (bsdf.as_lambert(), near) {
                 (Some(albedo), Some(s)) => albedo * s.irradiance() * FRAC_1_PI,
-                (Some(_), None) => Rgb::ZERO,
-                (None, _) => stored.reflected(&sites, bsdf, scratch),
+                _ => stored.reflected(&sites, bsdf, scratch),
             };
         }
         // Too near: direct light and glow here, the rest from one surface further. (Caustics here

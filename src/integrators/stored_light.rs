@@ -4,11 +4,11 @@ use std::f64::consts::FRAC_1_PI;
 
 use arrayvec::ArrayVec;
 
-use super::Scratch;
+use super::{RenderContext, Scratch};
 use crate::color::Rgb;
 use crate::geometry::SurfacePoint;
 use crate::materials::Bsdf;
-use crate::photons::map::{Estimate, IrradianceSample, PhotonMap, Site};
+use crate::photons::map::{Estimate, IrradianceSample, PhotonMap, Site, Surroundings};
 use crate::photons::{PhotonClass, PhotonMaps};
 
 /// Where photons count at a surface: on the side that is seen, and on the other one too if
@@ -25,7 +25,20 @@ pub(super) fn sites(sp: &SurfacePoint, bsdf: &Bsdf) -> ArrayVec<Site, 2> {
 
 /// The maps of a scene.
 pub(super) struct Stored<'a> {
-    pub(super) maps: &'a PhotonMaps,
+    maps: &'a PhotonMaps,
+    around: Surroundings<'a>,
+}
+
+impl<'a> Stored<'a> {
+    pub(super) fn new(cx: &RenderContext<'a>) -> Self {
+        Self {
+            maps: cx.maps,
+            around: Surroundings {
+                scene: cx.scene,
+                accel: cx.accel,
+            },
+        }
+    }
 }
 
 impl Stored<'_> {
@@ -40,7 +53,8 @@ impl Stored<'_> {
     ) -> Estimate {
         let mut sum = Estimate::default();
         for site in sites {
-            let e = map.estimate(site, &mut scratch.nearest, &keep, |wi| bsdf.diffuse_f(wi));
+            let f = |wi| bsdf.diffuse_f(wi);
+            let e = map.estimate(site, self.around, &mut scratch.nearest, &keep, f);
             sum.value += e.value;
             sum.density += e.density;
             sum.radius = sum.radius.max(e.radius);

@@ -27,15 +27,18 @@ mod uniform;
 pub use emit::{EMISSIONS, EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
 pub use ledger::Ledger;
 pub use map::{IrradianceMap, PhotonMap};
+use map::{Pilot, Surroundings};
 pub use photon::{Photon, PhotonClass};
 pub use progress::{PhotonPass, SAMPLES as SAMPLES_PER_PASS};
 pub use targets::Targets;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::accel::Accelerator;
 use crate::control::Control;
 use crate::effects::EffectSet;
+use crate::sampling::{hash2, stream};
 use crate::scene::Scene;
 use crate::stats::{PhotonCounts, RayCounts};
 
@@ -54,6 +57,21 @@ pub struct PhotonSettings {
     pub max_depth: Option<u32>,
     /// Whether paths end by Russian roulette; otherwise by the depth limit alone.
     pub roulette: bool,
+}
+
+/// Photons of a map for each one of its pilot emission, which decides the kernels.
+const PILOT_SHARE: u64 = 8;
+
+impl PhotonSettings {
+    /// Those of the pilot emission.
+    fn pilot(&self) -> Self {
+        Self {
+            seed: hash2(self.seed, stream::PILOT),
+            global: self.global.div_ceil(PILOT_SHARE),
+            caustic: self.caustic.div_ceil(PILOT_SHARE),
+            ..self.clone()
+        }
+    }
 }
 
 /// The finished maps; a map that the effects do not call for is absent.
@@ -92,16 +110,18 @@ pub fn trace_photons(
 ) -> PhotonMaps {
     let mut maps = PhotonMaps::default();
     let area = map::surface_area(scene);
-    let context = |purpose, count| EmissionContext {
-        scene,
-        accel,
-        seed: settings.seed,
-        purpose,
-        count,
-    };
-    let run = |purpose, count, maps: &mut PhotonMaps| {
+    let run = |purpose, settings: &PhotonSettings, maps: &mut PhotonMaps| {
         let start = Instant::now();
-        let source = (emission.build)(&context(purpose, count));
+        let source = (emission.build)(&EmissionContext {
+            scene,
+            accel,
+            seed: settings.seed,
+            purpose,
+            count: match purpose {
+                Purpose::Global => settings.global,
+                Purpose::Caustic => settings.caustic,
+            },
+        });
         let mut pass = trace::run(scene, accel, &*source, purpose, settings, control);
         pass.counts.checked = source.checks();
         pass.counts.cells = source.cells();
@@ -110,24 +130,45 @@ pub fn trace_photons(
         maps.tracing += start.elapsed().as_secs_f64();
         pass
     };
+    let pilot = settings.pilot();
+    let deciding = |whole: u64, part: u64| Pilot {
+        around: Surroundings { scene, accel },
+        nearest: settings.nearest,
+        ratio: whole as f64 / part as f64,
+    };
     let start = Instant::now();
     let indirect = effects.contains(EffectSet::INDIRECT) && settings.global > 0;
     if effects.contains(EffectSet::CAUSTICS) && settings.caustic > 0 {
-        let pass = run(Purpose::Caustic, settings.caustic, &mut maps);
+        let scout = run(Purpose::Caustic, &pilot, &mut maps);
+        let pass = run(Purpose::Caustic, settings, &mut maps);
         maps.caustic_counts = pass.counts;
-        maps.caustic = Some(PhotonMap::build(pass.photons, settings.nearest, area));
+        maps.caustic_counts.pilot = pilot.caustic;
+        let deciding = deciding(settings.caustic, pilot.caustic);
+        let all = |_| true;
+        let kernels = Arc::new(deciding.kernels(scout.photons, area, all, control));
+        let map = PhotonMap::build(pass.photons, settings.nearest, area);
+        maps.caustic = Some(map.with_kernels(kernels));
         if gather && indirect {
+            let kernels = Arc::new(deciding.kernels(scout.glow, area, all, control));
             let glow = PhotonMap::build(pass.glow, settings.nearest, area);
-            maps.glow = Some(IrradianceMap::build(&glow, |_| true, control));
+            maps.glow = Some(IrradianceMap::build(&glow, kernels, all, control));
         }
     }
     if indirect {
-        let pass = run(Purpose::Global, settings.global, &mut maps);
+        let scout = run(Purpose::Global, &pilot, &mut maps);
+        let pass = run(Purpose::Global, settings, &mut maps);
         maps.global_counts = pass.counts;
+        maps.global_counts.pilot = pilot.global;
         let map = PhotonMap::build(pass.photons, settings.nearest, area);
+        let keep = |class| match gather {
+            true => class != PhotonClass::Caustic,
+            false => class == PhotonClass::Indirect,
+        };
+        let deciding = deciding(settings.global, pilot.global);
+        let kernels = Arc::new(deciding.kernels(scout.photons, area, keep, control));
+        let map = map.with_kernels(Arc::clone(&kernels));
         if gather {
-            let keep = |class| class != PhotonClass::Caustic;
-            maps.irradiance = Some(IrradianceMap::build(&map, keep, control));
+            maps.irradiance = Some(IrradianceMap::build(&map, kernels, keep, control));
         }
         maps.global = Some(map);
     }

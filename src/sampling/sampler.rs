@@ -20,6 +20,8 @@ pub mod stream {
     pub const CAUSTIC_PHOTONS: u64 = 3;
     /// Anything a test or tool needs.
     pub const TOOL: u64 = 4;
+    /// Pilot photons. No number of a pass, whose seeds are made alike.
+    pub const PILOT: u64 = 1 << 40;
 }
 
 /// Dimension pairs taken from the low-discrepancy sequence.

@@ -68,7 +68,7 @@ fn photons(places: impl Iterator<Item = DVec3>) -> Vec<Photon> {
 /// The estimate at the origin: its value, and that times the kernel's area, in photons.
 fn estimate(list: Vec<Photon>, k: usize) -> (f64, f64) {
     let map = PhotonMap::build(list, k, 1.0);
-    let e = map.estimate(
+    let e = map.estimate_nearest(
         &Site::new(DVec3::ZERO, DVec3::Y),
         &mut Nearest::new(),
         |_| true,
@@ -132,7 +132,7 @@ pub fn p4(row: &mut Row) {
         let mut found = Nearest::new();
         let mut at = |z: f64, n: f64| {
             let site = Site::new(DVec3::new(0.1, 0.2, z), DVec3::Z * n);
-            map.estimate(&site, &mut found, |_| true, |_| Rgb::ONE)
+            map.estimate_nearest(&site, &mut found, |_| true, |_| Rgb::ONE)
                 .value
                 .r
         };

@@ -1,7 +1,6 @@
 //! A balanced k-d tree without nodes: the items themselves are sorted so that the middle one of
 //! every range splits it.
 
-use super::nearest::Nearest;
 use crate::math::Vec3;
 
 /// Ranges up to this size are searched item by item.
@@ -9,6 +8,30 @@ const LEAF: usize = 8;
 
 /// Ranges above this size are built in parallel.
 const PARALLEL: usize = 1 << 15;
+
+/// What a search is for.
+pub trait Search {
+    /// Squared distance beyond which nothing is wanted any more.
+    fn bound(&self) -> f32;
+
+    /// Takes item `i` at squared distance `d2`, which is below [`bound`](Self::bound).
+    fn offer(&mut self, i: u32, d2: f32);
+}
+
+/// A search for everything within a squared radius.
+pub struct Within<F>(pub f32, pub F);
+
+impl<F: FnMut(usize)> Search for Within<F> {
+    #[inline]
+    fn bound(&self) -> f32 {
+        self.0
+    }
+
+    #[inline]
+    fn offer(&mut self, i: u32, _d2: f32) {
+        (self.1)(i as usize);
+    }
+}
 
 /// The tree over a slice of items that it has sorted.
 #[derive(Debug, Default)]
@@ -36,7 +59,12 @@ impl KdTree {
     /// Offers every item within the bound of `found` around `p` that `accept` takes; `accept`
     /// gets the index and the squared radius that bounds the search at that moment.
     #[inline]
-    pub fn visit_near(&self, p: Vec3, found: &mut Nearest, accept: impl Fn(usize, f32) -> bool) {
+    pub fn visit_near(
+        &self,
+        p: Vec3,
+        found: &mut impl Search,
+        accept: impl Fn(usize, f32) -> bool,
+    ) {
         if self.points.is_empty() {
             return;
         }
@@ -85,7 +113,7 @@ impl KdTree {
         &self,
         p: [f32; 3],
         i: usize,
-        found: &mut Nearest,
+        found: &mut impl Search,
         accept: &impl Fn(usize, f32) -> bool,
     ) {
         let q = self.points[i];
@@ -140,6 +168,7 @@ fn split<T: Copy + Send>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::Nearest;
     use super::*;
     use crate::sampling::Rng;
 

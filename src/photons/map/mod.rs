@@ -1,14 +1,19 @@
 //! Photon maps: photons in a tree, and what is estimated from them.
 
+mod clearing;
 mod irradiance;
 mod kdtree;
+mod kernels;
 mod nearest;
 
+pub use clearing::Surroundings;
 pub use irradiance::{IrradianceMap, IrradianceSample};
-pub use kdtree::KdTree;
+pub use kdtree::{KdTree, Search, Within};
+pub use kernels::{Kernel, Kernels, Pilot};
 pub use nearest::Nearest;
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::photon::{Photon, PhotonClass};
 use crate::color::Rgb;
@@ -31,6 +36,9 @@ const REACH: f64 = 4.0;
 
 /// The smallest kernel's radius over the largest. Photons in one place would have no density.
 const LEAST: f32 = 1e-4;
+
+/// The smallest part of its disc that a kernel may have left.
+const LEAST_SHARE: f64 = 1e-3;
 
 /// Where a density is estimated.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +75,7 @@ pub struct PhotonMap {
     photons: Vec<Photon>,
     nearest: usize,
     max_radius: f32,
+    kernels: Option<Arc<Kernels>>,
 }
 
 /// What the photons near a site say.
@@ -85,13 +94,38 @@ impl PhotonMap {
     /// Builds the map. `nearest` photons make an estimate; `area` is that of all surfaces in m².
     pub fn build(mut photons: Vec<Photon>, nearest: usize, area: f64) -> Self {
         let tree = KdTree::build(&mut photons, |p| p.p);
-        let even = (nearest as f64 * area / (PI * photons.len().max(1) as f64)).sqrt();
+        let even = even_radius(nearest, area, photons.len() as f64);
         Self {
             tree,
             photons,
             nearest: nearest.max(2),
             max_radius: (REACH * even) as f32,
+            kernels: None,
         }
+    }
+
+    /// The same map, estimating with kernels that others have decided.
+    pub fn with_kernels(self, kernels: Arc<Kernels>) -> Self {
+        Self {
+            kernels: Some(kernels),
+            ..self
+        }
+    }
+
+    /// The kernels that others have decided.
+    pub fn kernels(&self) -> Option<&Arc<Kernels>> {
+        self.kernels.as_ref()
+    }
+
+    /// Distance to the farthest of the wanted number of photons around a site, or as far as is
+    /// searched.
+    fn spread(&self, site: &Site, found: &mut Nearest) -> f32 {
+        found.reset(self.nearest, self.max_radius * self.max_radius);
+        self.tree.visit_near(site.p, found, |i, r2| {
+            let photon = &self.photons[i];
+            site.accepts(photon.p, photon.ng(), r2)
+        });
+        found.kernel().1.sqrt()
     }
 
     /// Number of photons.
@@ -110,7 +144,78 @@ impl PhotonMap {
     }
 
     /// Estimates a density at `site` over the photons that `keep` accepts, weighing each by
-    /// `f(wi)`; `found` is scratch space.
+    /// `f(wi)`; `found` is scratch space. With the kernels that others have decided, or by the
+    /// nearest photons if there are none.
+    #[inline]
+    pub fn estimate(
+        &self,
+        site: &Site,
+        around: Surroundings<'_>,
+        found: &mut Nearest,
+        keep: impl Fn(PhotonClass) -> bool,
+        f: impl Fn(DVec3) -> Rgb,
+    ) -> Estimate {
+        let Some(kernels) = &self.kernels else {
+            return self.estimate_nearest(site, found, keep, f);
+        };
+        if let Some(i) = kernels.nearest(site, found) {
+            return self.estimate_within(site, kernels.at(i), keep, f);
+        }
+        // In the dark, or in a nook: only if there are photons, their surroundings are looked at.
+        let radius = kernels.radius(site, found);
+        let bare = self.estimate_within(site, Kernel::around(site, radius, None), &keep, &f);
+        if bare.density == 0.0 {
+            return bare;
+        }
+        match around.look(site, radius) {
+            Some(clearing) => {
+                let kernel = Kernel::around(site, radius, Some(&clearing));
+                self.estimate_within(site, kernel, keep, f)
+            }
+            None => bare,
+        }
+    }
+
+    /// As [`estimate`](Self::estimate), over all photons of a given kernel.
+    #[inline]
+    pub fn estimate_within(
+        &self,
+        site: &Site,
+        kernel: Kernel<'_>,
+        keep: impl Fn(PhotonClass) -> bool,
+        f: impl Fn(DVec3) -> Rgb,
+    ) -> Estimate {
+        let plane = kernel.plane();
+        let r = f64::from(kernel.radius);
+        let disc = PI * r * r;
+        let (mut sum, mut counted) = (Rgb::ZERO, 0u32);
+        let mut search = Within(kernel.radius * kernel.radius, |i: usize| {
+            let photon = &self.photons[i];
+            sum += f(photon.wi()) * photon.power();
+            counted += 1;
+        });
+        self.tree.visit_near(site.p, &mut search, |i, r2| {
+            let photon = &self.photons[i];
+            keep(photon.class)
+                && site.accepts(photon.p, photon.ng(), r2)
+                && plane.as_ref().is_none_or(|c| c.contains(photon.p.into()))
+        });
+        if counted == 0 {
+            return Estimate {
+                radius: r,
+                ..Default::default()
+            };
+        }
+        let area = plane.map_or(disc, |c| c.disc(site.p, r).clamp(LEAST_SHARE * disc, disc));
+        let inv_area = 1.0 / area.max(f64::MIN_POSITIVE);
+        Estimate {
+            value: sum * inv_area,
+            density: f64::from(counted) * inv_area,
+            radius: r,
+        }
+    }
+
+    /// As [`estimate`](Self::estimate), by the nearest photons.
     ///
     /// With `k` nearest photons the kernel's radius is the distance to the `k`-th, which itself
     /// is not counted: `Σ_{i<k} / (π r_k²)` is unbiased on uniform light, where counting it would
@@ -118,7 +223,7 @@ impl PhotonMap {
     /// of them are taken over the disc of that radius. Of several photons at the `k`-th distance
     /// one is not counted, whichever: each counts by so much less.
     #[inline]
-    pub fn estimate(
+    pub fn estimate_nearest(
         &self,
         site: &Site,
         found: &mut Nearest,
@@ -166,6 +271,11 @@ impl PhotonMap {
             radius: f64::from(r2).sqrt(),
         }
     }
+}
+
+/// Radius that holds `nearest` of `photons` if they lie evenly on `area` m².
+fn even_radius(nearest: usize, area: f64, photons: f64) -> f64 {
+    (nearest as f64 * area / (PI * photons.max(1.0))).sqrt()
 }
 
 /// Area of all surfaces in m², world space.

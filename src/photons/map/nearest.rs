@@ -1,5 +1,7 @@
 //! The `k` nearest of what a search offers.
 
+use super::kdtree::Search;
+
 /// A bounded max-heap of squared distances; reused between searches.
 #[derive(Clone, Debug, Default)]
 pub struct Nearest {
@@ -23,32 +25,6 @@ impl Nearest {
         self.k = k.max(1);
         self.max2 = max2;
         self.full = false;
-    }
-
-    /// Squared distance beyond which nothing is taken any more.
-    #[inline]
-    pub fn bound(&self) -> f32 {
-        self.max2
-    }
-
-    /// Takes item `i` at squared distance `d2`, which must be below [`bound`](Self::bound).
-    #[inline]
-    pub fn offer(&mut self, i: u32, d2: f32) {
-        if !self.full {
-            self.heap.push((d2, i));
-            if self.heap.len() == self.k {
-                self.full = true;
-                // Heapify once, when it fills.
-                for at in (0..self.k / 2).rev() {
-                    self.sift_down(at);
-                }
-                self.max2 = self.heap[0].0;
-            }
-        } else {
-            self.heap[0] = (d2, i);
-            self.sift_down(0);
-            self.max2 = self.heap[0].0;
-        }
     }
 
     #[inline]
@@ -95,5 +71,31 @@ impl Nearest {
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (usize, f32)> + '_ {
         self.heap.iter().map(|&(d2, i)| (i as usize, d2))
+    }
+}
+
+impl Search for Nearest {
+    #[inline]
+    fn bound(&self) -> f32 {
+        self.max2
+    }
+
+    #[inline]
+    fn offer(&mut self, i: u32, d2: f32) {
+        if !self.full {
+            self.heap.push((d2, i));
+            if self.heap.len() == self.k {
+                self.full = true;
+                // Heapify once, when it fills.
+                for at in (0..self.k / 2).rev() {
+                    self.sift_down(at);
+                }
+                self.max2 = self.heap[0].0;
+            }
+        } else {
+            self.heap[0] = (d2, i);
+            self.sift_down(0);
+            self.max2 = self.heap[0].0;
+        }
     }
 }

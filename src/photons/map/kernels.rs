@@ -1,0 +1,219 @@
+//! How wide kernels are, and where they end: decided at some sites by the photons of a pilot
+//! emission. Since those are not the photons that a kernel counts, neither its radius nor the
+//! test that narrows it can prefer one outcome of the count to another, and the mean of an
+//! estimate is exact whatever the photons' arrangement. (The distance to the `k`-th neighbour
+//! among the counted photons themselves is exact for random ones only; for stratified ones it
+//! loses up to `1/k`.)
+//!
+//! Source: for kernels chosen by photons of other passes, Kaplanyan and Dachsbacher, *Adaptive
+//! Progressive Photon Mapping*, ACM TOG 32(2), 2013.
+
+use rayon::prelude::*;
+
+use super::clearing::{Clearing, Plane, Surroundings};
+use super::{KdTree, Nearest, PhotonMap, Site};
+use crate::control::Control;
+use crate::math::Vec3;
+use crate::photons::PhotonClass;
+
+/// Pilot photons that tell a density: enough for a radius good to a tenth.
+const PILOT_NEAREST: usize = 16;
+
+/// Sites nearer to each other than this part of their radius are one.
+const THINNING: f32 = 1.0 / 64.0;
+
+/// A kernel.
+#[derive(Clone, Copy)]
+pub struct Kernel<'a> {
+    /// Radius in metres.
+    pub radius: f32,
+    /// What limits it.
+    plane: Option<(&'a Clearing, Vec3, Vec3)>,
+}
+
+impl<'a> Kernel<'a> {
+    /// A disc around `site`, limited by what was seen from there.
+    pub(super) fn around(site: &Site, radius: f32, clearing: Option<&'a Clearing>) -> Self {
+        Self {
+            radius,
+            plane: clearing.map(|c| (c, site.p, site.ng)),
+        }
+    }
+
+    #[inline]
+    pub(super) fn plane(&self) -> Option<Plane<'a>> {
+        self.plane.map(|(c, p, ng)| Plane::new(c, p, ng))
+    }
+}
+
+/// Where a kernel was decided.
+#[derive(Clone, Copy, Debug)]
+struct KernelSite {
+    p: Vec3,
+    ng: Vec3,
+    radius: f32,
+    /// Index of its clearing; open if there is none.
+    clearing: u32,
+}
+
+const OPEN: u32 = u32::MAX;
+
+/// The kernels of a map.
+#[derive(Debug, Default)]
+pub struct Kernels {
+    tree: KdTree,
+    sites: Vec<KernelSite>,
+    clearings: Vec<Clearing>,
+    /// The radius where no pilot photon came.
+    widest: f32,
+}
+
+/// What kernels are decided by.
+pub struct Pilot<'a> {
+    /// Where the surfaces stand.
+    pub around: Surroundings<'a>,
+    /// Photons that a kernel is to hold.
+    pub nearest: usize,
+    /// Photons of the map for each of the pilot's.
+    pub ratio: f64,
+}
+
+impl Pilot<'_> {
+    /// Decides kernels at the photons of the pilot emission that `keep` accepts. `area` is that
+    /// of all surfaces in m².
+    pub fn kernels(
+        &self,
+        photons: Vec<crate::photons::Photon>,
+        area: f64,
+        keep: impl Fn(PhotonClass) -> bool,
+        control: &Control,
+    ) -> Kernels {
+        let photons: Vec<_> = photons.into_iter().filter(|p| keep(p.class)).collect();
+        let stage = control.stage("kernels", "sites", photons.len() as u64);
+        // Of as many pilot photons the kernel would hold `nearest` of the map's.
+        let even = super::even_radius(self.nearest, area, photons.len() as f64 * self.ratio);
+        let map = PhotonMap::build(photons, PILOT_NEAREST, area);
+        let scale = (self.nearest as f64 / (PILOT_NEAREST as f64 * self.ratio)).sqrt();
+        let widest = (super::REACH * even) as f32;
+        let decided: Vec<(KernelSite, Option<Clearing>)> = map
+            .photons()
+            .par_chunks(1024)
+            .flat_map_iter(|chunk| {
+                let mut found = Nearest::new();
+                let mut part: Vec<(KernelSite, Option<Clearing>)> = Vec::new();
+                for photon in chunk {
+                    let site = Site {
+                        p: Vec3::from(photon.p),
+                        ng: photon.ng(),
+                    };
+                    let near = map.spread(&site, &mut found);
+                    let radius = (f64::from(near) * scale) as f32;
+                    let radius = radius.clamp(super::LEAST * widest, widest);
+                    // Photons in one place need to be counted once only.
+                    let apart = THINNING * radius;
+                    if part.last().is_some_and(|(last, _)| {
+                        last.p.distance_squared(site.p) < apart * apart && last.ng == site.ng
+                    }) {
+                        continue;
+                    }
+                    let clearing = self.around.look(&site, radius);
+                    let site = KernelSite {
+                        p: site.p,
+                        ng: site.ng,
+                        radius,
+                        clearing: OPEN,
+                    };
+                    part.push((site, clearing));
+                }
+                stage.advance(chunk.len() as u64);
+                part
+            })
+            .collect();
+        let mut clearings = Vec::new();
+        let mut sites: Vec<KernelSite> = decided
+            .into_iter()
+            .map(|(mut site, clearing)| {
+                if let Some(c) = clearing {
+                    site.clearing = clearings.len() as u32;
+                    clearings.push(c);
+                }
+                site
+            })
+            .collect();
+        let tree = KdTree::build(&mut sites, |s| s.p.into());
+        Kernels {
+            tree,
+            sites,
+            clearings,
+            widest,
+        }
+    }
+}
+
+impl Kernels {
+    /// Number of sites.
+    pub fn len(&self) -> usize {
+        self.sites.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.sites.is_empty()
+    }
+
+    /// The sites themselves.
+    pub fn sites(&self) -> impl IndexedParallelIterator<Item = Site> + '_ {
+        self.sites.par_iter().map(|s| Site { p: s.p, ng: s.ng })
+    }
+
+    fn of(&self, s: &KernelSite) -> Kernel<'_> {
+        let clearing = self.clearings.get(s.clearing as usize);
+        Kernel {
+            radius: s.radius,
+            plane: clearing.map(|c| (c, s.p, s.ng)),
+        }
+    }
+
+    /// The kernel decided at a site of a number.
+    pub fn at(&self, i: usize) -> Kernel<'_> {
+        self.of(&self.sites[i])
+    }
+
+    /// The nearest site on the same side of the same surface that has looked at what lies around
+    /// `site`.
+    #[inline]
+    pub fn nearest(&self, site: &Site, found: &mut Nearest) -> Option<usize> {
+        // Nearly always something lies close by; the wide search is for dark regions.
+        for reach in [0.25, 1.0] {
+            let r = self.widest * reach;
+            found.reset(1, r * r);
+            self.tree.visit_near(site.p, found, |i, _| {
+                let s = &self.sites[i];
+                site.accepts(s.p.into(), s.ng, r * r)
+                    && match self.of(s).plane() {
+                        Some(plane) => plane.contains(site.p),
+                        // Twice the radius is open, so that all of a kernel here is, too.
+                        None => site.p.distance_squared(s.p) <= s.radius * s.radius,
+                    }
+            });
+            if let Some((i, _)) = found.iter().next() {
+                return Some(i);
+            }
+        }
+        None
+    }
+
+    /// The radius at a site that none has looked at: that of the nearest, and the widest where
+    /// none is near.
+    pub(super) fn radius(&self, site: &Site, found: &mut Nearest) -> f32 {
+        found.reset(1, self.widest * self.widest);
+        self.tree.visit_near(site.p, found, |i, r2| {
+            let s = &self.sites[i];
+            site.accepts(s.p.into(), s.ng, r2)
+        });
+        match found.iter().next() {
+            Some((i, d2)) => self.sites[i].radius.max(d2.sqrt()),
+            None => self.widest,
+        }
+    }
+}
