@@ -37,8 +37,9 @@ const REACH: f64 = 4.0;
 /// The smallest kernel's radius over the largest. Photons in one place would have no density.
 const LEAST: f32 = 1e-4;
 
-/// The smallest part of its disc that a kernel may have left.
-const LEAST_SHARE: f64 = 1e-3;
+/// The smallest part of its disc that a kernel may have left. On something so narrow that less is
+/// left, hardly a photon would be counted, but for all the brighter.
+const LEAST_SHARE: f64 = 0.08;
 
 /// Where a density is estimated.
 #[derive(Clone, Copy, Debug)]
