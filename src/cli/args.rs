@@ -7,6 +7,7 @@ use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::measure_args::{AccuracyArgs, BenchArgs};
+use super::quality::Quality;
 use super::values::{self, Crop, Size};
 use crate::report::ErrorMap;
 
@@ -150,7 +151,10 @@ pub struct RenderArgs {
     /// Size of the image in pixels [default: 512 wide, as high as the camera asks for]
     #[arg(long, value_name = "WxH", help_heading = "Image")]
     pub size: Option<Size>,
-    /// Camera samples per pixel [default: 16; no limit with --target-error]
+    /// How many samples and photons, in one word; options that say more exactly go before it
+    #[arg(long, value_enum, default_value = "normal", help_heading = "Image")]
+    pub quality: Quality,
+    /// Camera samples per pixel [default: that of --quality; no limit with --target-error]
     #[arg(long, value_name = "N", value_parser = values::positive_u32)]
     #[arg(help_heading = "Image")]
     pub spp: Option<u32>,

@@ -15,6 +15,7 @@ pub mod measure_args;
 pub mod plan;
 mod plugins;
 pub mod progress;
+pub mod quality;
 mod render;
 mod signal;
 mod summary;

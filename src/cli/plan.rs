@@ -77,7 +77,7 @@ impl Plan {
         for path in &args.outputs {
             output::format_of(&registry.outputs, path)?;
         }
-        let defaults = IntegratorSettings::default();
+        let defaults = args.quality.settings();
         let plan = Self {
             scene: args.scene.file.clone(),
             import: import_options(&args.scene),
@@ -103,7 +103,7 @@ impl Plan {
                 height: 0,
                 spp: args.spp.unwrap_or(match args.target_error {
                     Some(_) => u32::MAX,
-                    None => RenderSettings::default().spp,
+                    None => args.quality.spp(),
                 }),
                 progressive: progressive(args),
                 crop: args.crop.map(|c| c.0),
@@ -255,6 +255,12 @@ mod tests {
 
     #[test]
     fn options_arrive_where_they_belong() {
+        let p = plan("--quality draft --photons 7k").unwrap();
+        let i = &p.settings.integrator_settings;
+        assert_eq!(
+            (p.settings.spp, i.photons, i.caustic_photons),
+            (4, 7000, 250_000)
+        );
         let p = plan(
             "--gather off --photons 2M --caustic-photons 10k --nearest 5 --shadow-rays 3 \
              --no-roulette --max-depth 4 --seed 9 --threads 2 --effects all,-caustics",

@@ -25,6 +25,8 @@ pub struct Series {
     pub dashed: bool,
     /// Abscissa and ordinate. What is not positive is left out.
     pub points: Vec<(Interval, Interval)>,
+    /// A word beside each point; fewer, or empty ones, for none.
+    pub labels: Vec<String>,
 }
 
 /// A plot.
@@ -231,11 +233,8 @@ impl Series {
     }
 
     fn svg(&self, x: &Axis, y: &Axis) -> String {
-        let shown: Vec<&(Interval, Interval)> = self
-            .points
-            .iter()
-            .filter(|(a, b)| a.value > 0.0 && b.value > 0.0)
-            .collect();
+        let positive = |p: &&(Interval, Interval)| p.0.value > 0.0 && p.1.value > 0.0;
+        let shown: Vec<&(Interval, Interval)> = self.points.iter().filter(positive).collect();
         let mut out = String::new();
         let line: Vec<String> = shown
             .iter()
@@ -259,6 +258,17 @@ impl Series {
                 x.at(a.low.max(f64::MIN_POSITIVE)),
                 x.at(a.high),
             );
+        }
+        for ((a, b), label) in self.points.iter().zip(&self.labels) {
+            if a.value > 0.0 && b.value > 0.0 && !label.is_empty() {
+                let _ = writeln!(
+                    out,
+                    "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{stroke}\">{}</text>",
+                    x.at(a.value) + 7.0,
+                    y.at(b.value) - 7.0,
+                    escape(label)
+                );
+            }
         }
         out
     }
@@ -288,6 +298,7 @@ mod tests {
                 colour: 0,
                 dashed: true,
                 points: vec![point(0.1, 1.0), point(10.0, 1e-4), point(20.0, -1.0)],
+                labels: vec!["begin".into()],
             }],
             size: (480.0, 320.0),
         };

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::Study;
 use super::layers::{Moments, Scale, names};
 use super::measure::{Kind, Run};
-use super::methods::{CHANGES, Method};
+use super::methods::{CHANGES, Method, preset};
 use crate::report::diff::Pair;
 use crate::report::statistics::{
     Interval, Reach, bootstrap, mean, mean_interval, median, reach, slope,
@@ -31,6 +31,8 @@ pub struct Point {
     pub name: String,
     /// Rung of the ladder; `None` for changes.
     pub rung: Option<u32>,
+    /// The preset that it stands for, if any.
+    pub preset: Option<&'static str>,
     /// Samples per pixel.
     pub spp: u32,
     /// Photons, if there are any.
@@ -247,6 +249,7 @@ fn point(study: &Study, setting: usize, scale: &Scale) -> Point {
     Point {
         name,
         rung,
+        preset: rung.filter(|_| photons).and_then(preset),
         spp: s.settings.spp,
         photons: photons.then_some(i.photons),
         nearest: photons.then_some(i.nearest),
@@ -355,7 +358,8 @@ pub(super) fn analyse(study: &Study) -> Analysis {
 
 /// A setting in a few words.
 pub(super) fn describe(p: &Point) -> String {
-    let mut out = format!("{} samples", p.spp);
+    let mut out = p.preset.map_or(String::new(), |name| format!("{name}: "));
+    out += &format!("{} samples", p.spp);
     if let (Some(n), Some(k)) = (p.photons, p.nearest) {
         out += &format!(", {n} photons, {k} in a kernel");
     }

@@ -2,6 +2,7 @@
 //! method or a change is one line.
 
 use crate::integrators::IntegratorSettings;
+use crate::photons::SAMPLES_PER_PASS;
 use crate::pipeline::RenderSettings;
 use crate::plugins::Registry;
 
@@ -43,6 +44,14 @@ impl Method {
         let entry = registry.integrators.choose(Some(&self.integrator));
         entry.is_ok_and(|e| e.photons)
     }
+}
+
+/// The preset of `--quality` that renders like a rung of the ladder with photons, at the size
+/// that pictures have if none is given; smaller ones have as many photons per pixel.
+pub(super) fn preset(rung: u32) -> Option<&'static str> {
+    ["draft", "normal", "high"]
+        .get(rung.checked_sub(1)? as usize)
+        .copied()
 }
 
 /// Name, sentence, integrator, emission, ladder.
@@ -117,7 +126,9 @@ const FEWEST_PHOTONS: u64 = 10_000;
 /// all photons, which balances its noise, `1/k`, and its bias, `(k/N)²` (Knaus and Zwicker 2011).
 fn photon_ladder(s: &mut RenderSettings, rung: u32) {
     s.spp = 1 << (2 * rung);
-    let samples = u64::from(s.width) * u64::from(s.height) * u64::from(s.spp);
+    // Longer renderings trace new photons, and more of them, every so many samples.
+    let of_pass = s.spp.min(SAMPLES_PER_PASS);
+    let samples = u64::from(s.width) * u64::from(s.height) * u64::from(of_pass);
     let photons = (samples / SAMPLES_PER_PHOTON).max(FEWEST_PHOTONS);
     set_photons(&mut s.integrator_settings, photons);
 }

@@ -1,6 +1,6 @@
 //! The plots of a study.
 
-use super::{Analysis, Clock, Point};
+use super::{Analysis, Clock, Curve, Point};
 use crate::report::statistics::Interval;
 use crate::report::svg::{Plot, Series};
 
@@ -26,6 +26,7 @@ fn plot(
                 .curve(&c.method)
                 .filter_map(|p| Some((p.seconds, value(p)?)))
                 .collect(),
+            labels: Vec::new(),
         })
     });
     Plot {
@@ -40,13 +41,23 @@ fn plot(
 /// The one plot that says most: error of the whole picture against time.
 pub fn overview(analysis: &Analysis, clock: Clock, title: &str) -> Plot {
     let error = |p: &Point| Some(p.error());
-    plot(
+    let mut plot = plot(
         analysis,
         clock,
         (title, "relMSE"),
         LARGE,
         &[("", false, &error)],
-    )
+    );
+    // Presets stand where the first method with photons has their samples.
+    let ladder = |c: &&Curve| analysis.curve(&c.method).any(|p| p.photons.is_some());
+    if let Some(c) = analysis.curves.iter().find(ladder) {
+        let preset = |p: &Point| p.preset.unwrap_or_default().to_string();
+        let labels = analysis.curve(&c.method).map(preset).collect();
+        if let Some(s) = plot.series.iter_mut().find(|s| s.name == c.method) {
+            s.labels = labels;
+        }
+    }
+    plot
 }
 
 /// FLIP against time; `None` if this build knows no FLIP.
