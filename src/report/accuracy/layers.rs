@@ -9,7 +9,7 @@ pub(super) fn names() -> Vec<&'static str> {
     all
 }
 
-/// The pixels of some layers, as in [`names`].
+/// The pixels of some layers: the whole, then the components in the order of [`Component::ALL`].
 #[derive(Clone, Debug)]
 pub struct Layers {
     /// Width in pixels.
