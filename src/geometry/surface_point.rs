@@ -108,6 +108,25 @@ impl SurfacePoint {
         Ray::segment(self.offset_toward(target - self.p), target)
     }
 
+    /// The segment to `target`, or the ray along `d` without end: in one piece, so that a compiler
+    /// keeps it in registers.
+    #[inline(always)]
+    pub fn spawn_toward(&self, d: DVec3, target: Option<DVec3>) -> Ray {
+        let from = self
+            .offset_toward(target.map_or(d, |t| t - self.p))
+            .as_vec3();
+        let (d, tmax) = match target {
+            Some(t) => (t - from.as_dvec3(), 1.0),
+            None => (d, f32::INFINITY),
+        };
+        Ray {
+            o: from,
+            tmin: 0.0,
+            d: d.as_vec3(),
+            tmax,
+        }
+    }
+
     /// The position, moved off the surface to the side that `d` points to.
     #[inline]
     pub fn offset_toward(&self, d: DVec3) -> DVec3 {
@@ -161,6 +180,7 @@ fn on_triangle(o: DVec3, d: DVec3, near: &Near, prim: u32, mesh: &TriangleMesh) 
     // the point is kept on the triangle.
     let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
     let normal = e1.cross(e2);
+    let n2 = normal.length_squared();
     let (o, d) = (V3::<f64>::constant(o), V3::constant(d));
     let (t, b1, b2) = match triangle::plane_hit(o, d, v[0], e1, e2, normal) {
         Some(h) => {
@@ -172,7 +192,8 @@ fn on_triangle(o: DVec3, d: DVec3, near: &Near, prim: u32, mesh: &TriangleMesh) 
     Refined {
         t,
         p: v[0] + e1 * b1 + e2 * b2,
-        ng: normal * (1.0 / normal.length_squared().sqrt()),
+        // One over the length, in which the division does not wait for the root.
+        ng: normal * (n2.sqrt() * (1.0 / n2)),
         smooth: mesh.normal(prim, b1, b2).and_then(DVec3::try_normalize),
         barycentrics: [b1, b2],
         // A backend's rounding grows with the corners, which can be far from the point.

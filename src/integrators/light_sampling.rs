@@ -132,9 +132,8 @@ pub(super) fn sample_direct(
     }
     value.diffuse *= li.radiance;
     value.glossy *= li.radiance;
-    let ray = match li.target {
-        Some(target) => sp.spawn_to(target),
-        None => sp.spawn(li.wi),
-    };
-    Some(DirectSample { value, ray })
+    Some(DirectSample {
+        value,
+        ray: sp.spawn_toward(li.wi, li.target),
+    })
 }

@@ -248,7 +248,11 @@ impl Path<'_> {
             return false;
         }
         w.ray = sp.spawn(s.wi);
-        w.differential = trail.leave(sp, &s);
+        // Without textures there is none, and nothing is copied.
+        match trail.leave(sp, &s) {
+            None => w.differential = None,
+            left => w.differential = left,
+        }
         true
     }
 }

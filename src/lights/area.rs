@@ -86,12 +86,14 @@ impl Light for AreaLight {
         let on = self.point(u)?;
         let to = on.p - p;
         let d2 = to.length_squared();
-        if !(d2 > 0.0) {
+        if !(d2 >= f64::MIN_POSITIVE) {
             return None;
         }
-        let wi = to * (1.0 / d2.sqrt());
-        let ng = on.triangle.ng;
-        let cos = -wi.dot(ng);
+        let (d, ng) = (d2.sqrt(), on.triangle.ng);
+        // The division does not wait for the root,
+        let wi = to * (d * (1.0 / d2));
+        // nor does the cosine times the distance.
+        let cos = -to.dot(ng);
         if cos == 0.0 || (cos < 0.0 && !self.double_sided) {
             return None;
         }
@@ -99,7 +101,7 @@ impl Light for AreaLight {
             wi,
             target: Some(on.p + ng * on.triangle.offset.copysign(cos)),
             radiance: on.radiance,
-            pdf: d2 * on.pdf_area / cos.abs(),
+            pdf: d * (d2 * on.pdf_area / cos.abs()),
             delta: false,
         })
     }

@@ -55,7 +55,7 @@ impl Discrete {
 
     /// Index chosen by `u` in `[0, 1)`, its probability, and `u` rescaled to `[0, 1)` within it.
     /// `None` for an empty distribution.
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, u: f64) -> Option<(usize, f64, f64)> {
         let n = self.inverse.len();
         if n <= 1 {

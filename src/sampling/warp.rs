@@ -1,6 +1,7 @@
 //! Maps from the unit square to what renderers sample, each with its density.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI};
+use std::hint::select_unpredictable;
 
 use crate::math::{DVec3, larger};
 
@@ -24,31 +25,38 @@ fn sin_cos_octant(x: f64) -> (f64, f64) {
     (x * s, c)
 }
 
-/// Uniform point of the unit disc, by the concentric map of Shirley and Chiu (1997).
+/// Uniform point of the unit disc, by the concentric map of Shirley and Chiu (1997), and its
+/// distance from the centre, up to its sign.
 #[inline(always)]
-pub fn disc(u: [f64; 2]) -> [f64; 2] {
+fn concentric(u: [f64; 2]) -> ([f64; 2], f64) {
     let a = 2.0 * u[0] - 1.0;
     let b = 2.0 * u[1] - 1.0;
     if a == 0.0 && b == 0.0 {
-        return [0.0, 0.0];
+        return ([0.0, 0.0], 0.0);
     }
     // Which octant is a coin toss that no processor predicts: selects, not branches.
     let wide = a.abs() > b.abs();
-    let (r, other) = if wide { (a, b) } else { (b, a) };
+    let r = select_unpredictable(wide, a, b);
+    let other = select_unpredictable(wide, b, a);
     let (s, c) = sin_cos_octant(FRAC_PI_4 * (other / r));
     let (along, across) = (r * c, r * s);
-    if wide {
-        [along, across]
-    } else {
-        [across, along]
-    }
+    let x = select_unpredictable(wide, along, across);
+    let y = select_unpredictable(wide, across, along);
+    ([x, y], r)
+}
+
+/// Uniform point of the unit disc.
+#[inline(always)]
+pub fn disc(u: [f64; 2]) -> [f64; 2] {
+    concentric(u).0
 }
 
 /// Direction around `+z` with density [`cosine_hemisphere_pdf`].
-#[inline]
+#[inline(always)]
 pub fn cosine_hemisphere(u: [f64; 2]) -> DVec3 {
-    let [x, y] = disc(u);
-    DVec3::new(x, y, larger(1.0 - x * x - y * y, 0.0).sqrt())
+    let ([x, y], r) = concentric(u);
+    // By the radius, which is known before the point is.
+    DVec3::new(x, y, (1.0 - r * r).sqrt())
 }
 
 /// Density `cos θ / π` in solid angle.

@@ -97,17 +97,16 @@ impl Bsdf {
 
     /// Adds a lobe; it is picked in proportion to its albedo. A black lobe is left out.
     #[inline]
-    pub fn push(&mut self, lobe: impl Into<Lobe>) {
+    pub fn push(&mut self, lobe: impl LobeModel + Into<Lobe>) {
         self.push_in(lobe, FrameId::MAIN);
     }
 
     /// As [`push`](Self::push), in one of the frames.
     #[inline]
-    pub fn push_in(&mut self, lobe: impl Into<Lobe>, frame: FrameId) {
-        let lobe = lobe.into();
+    pub fn push_in(&mut self, lobe: impl LobeModel + Into<Lobe>, frame: FrameId) {
         let pick = lobe.albedo(self.view(frame).wo).max_channel();
         let entry = Entry {
-            lobe,
+            lobe: lobe.into(),
             pick,
             frame,
             under: self.covers.len() as u8,

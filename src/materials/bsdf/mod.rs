@@ -41,6 +41,17 @@ pub struct BsdfSample {
     pub transmitted: bool,
 }
 
+impl BsdfSample {
+    /// Nothing.
+    const NONE: Self = Self {
+        wi: DVec3::ZERO,
+        weight: Rgb::ZERO,
+        pdf: 0.0,
+        class: LobeClass::Delta,
+        transmitted: false,
+    };
+}
+
 /// `f·|cos θi|`, by lobe class, each lobe weighted by its own share against light sampling.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BsdfValue {
@@ -385,13 +396,20 @@ impl Bsdf {
                 let s = lobe.sample(self.main.wo, u_lobe, u)?;
                 self.scattered(&self.main, &s, LobeClass::Diffuse, 1.0, 1.0)
             }
-            None => self.sample_stack(u_lobe, u),
+            None => {
+                // By reference, so that a Lambert sample need not go through memory to where
+                // this function would put its answer.
+                let mut out = BsdfSample::NONE;
+                self.sample_stack(u_lobe, u, &mut out).then_some(out)
+            }
         }
     }
 
     #[inline(never)]
-    fn sample_stack(&self, u_lobe: f64, u: [f64; 2]) -> Option<BsdfSample> {
-        let (last, firsts) = self.lobes.split_last()?;
+    fn sample_stack(&self, u_lobe: f64, u: [f64; 2], out: &mut BsdfSample) -> bool {
+        let Some((last, firsts)) = self.lobes.split_last() else {
+            return false;
+        };
         let (mut chosen, mut p_lobe, mut u_in) = (last, 1.0, u_lobe);
         if !firsts.is_empty() {
             let mut rest = u_lobe * self.total;
@@ -408,10 +426,14 @@ impl Bsdf {
         }
         let lobe = &chosen.lobe;
         let view = self.view(chosen.frame);
-        let s = lobe.sample(view.wo, u_in, u)?;
-        let mut out = self.scattered(view, &s, lobe.class(), lobe.eta(), p_lobe)?;
-        out.weight *= self.uncovered(chosen.under, out.wi);
-        Some(out)
+        let scattered = lobe
+            .sample(view.wo, u_in, u)
+            .and_then(|s| self.scattered(view, &s, lobe.class(), lobe.eta(), p_lobe));
+        if let Some(s) = scattered {
+            *out = s;
+            out.weight *= self.uncovered(chosen.under, out.wi);
+        }
+        scattered.is_some()
     }
 
     /// The sample `s` of a lobe that was picked with probability `p_lobe`, in the world.

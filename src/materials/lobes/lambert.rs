@@ -28,7 +28,7 @@ impl LobeModel for Lambert {
         (self.albedo * FRAC_1_PI, warp::cosine_hemisphere_pdf(wi.z))
     }
 
-    #[inline]
+    #[inline(always)]
     fn sample(&self, _wo: DVec3, _u_pick: f64, u: [f64; 2]) -> Option<LobeSample> {
         let wi = warp::cosine_hemisphere(u);
         Some(LobeSample {
