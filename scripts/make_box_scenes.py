@@ -128,6 +128,16 @@ def scene(rings, sectors, analytic):
     }
 
 
+def write_glb(path, buffer, doc):
+    """Writes a binary glTF."""
+    text = json.dumps(doc, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    data = buffer.data + b"\0" * (-len(buffer.data) % 4)
+    chunk = lambda kind, body: struct.pack("<I4s", len(body), kind) + body
+    body = chunk(b"JSON", text) + chunk(b"BIN\0", data)
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body)
+
+
 def main():
     folder = Path(__file__).resolve().parent.parent / "scenes"
     # Viewers without analytic spheres show these coarse balls instead.
@@ -137,12 +147,8 @@ def main():
     (folder / "box.gltf").write_text(json.dumps(doc, indent=1) + "\n")
 
     buffer, doc = scene(128, 256, analytic=False)
-    text = json.dumps(doc, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    data = buffer.data + b"\0" * (-len(buffer.data) % 4)
-    chunk = lambda kind, body: struct.pack("<I4s", len(body), kind) + body
-    body = chunk(b"JSON", text) + chunk(b"BIN\0", data)
-    (folder / "box_mesh.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body)
+    write_glb(folder / "box_mesh.glb", buffer, doc)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -188,7 +188,8 @@ impl Plot {
     }
 
     fn legend(&self) -> String {
-        let named: Vec<&Series> = self.series.iter().filter(|s| !s.name.is_empty()).collect();
+        let named = |s: &&Series| !s.name.is_empty() && s.shown().next().is_some();
+        let named: Vec<&Series> = self.series.iter().filter(named).collect();
         let longest = named.iter().map(|s| s.name.chars().count()).max();
         let Some(longest) = longest else {
             return String::new();
@@ -232,9 +233,14 @@ impl Series {
         }
     }
 
-    fn svg(&self, x: &Axis, y: &Axis) -> String {
+    /// The points that logarithms have a place for.
+    fn shown(&self) -> impl Iterator<Item = &(Interval, Interval)> {
         let positive = |p: &&(Interval, Interval)| p.0.value > 0.0 && p.1.value > 0.0;
-        let shown: Vec<&(Interval, Interval)> = self.points.iter().filter(positive).collect();
+        self.points.iter().filter(positive)
+    }
+
+    fn svg(&self, x: &Axis, y: &Axis) -> String {
+        let shown: Vec<&(Interval, Interval)> = self.shown().collect();
         let mut out = String::new();
         let line: Vec<String> = shown
             .iter()

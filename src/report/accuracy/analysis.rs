@@ -87,8 +87,12 @@ pub struct Level {
     pub seconds: Option<Interval>,
     /// Seconds of its first point, where that is below the level already.
     pub at_most: Option<f64>,
+    /// Seconds of its last point, where that is above the level still.
+    pub more_than: Option<f64>,
     /// Seconds of the first method over seconds of this one.
     pub ratio: Option<Interval>,
+    /// Where one of the two is only bounded: what this ratio is at least.
+    pub ratio_at_least: Option<f64>,
     /// Whether this ratio is told from 1: beyond its interval and beyond the noise floor.
     pub differs: bool,
 }
@@ -418,14 +422,32 @@ fn curve(
         let time = |of: &[&Point], picks: &[usize]| reach(&over(of, picks), error);
         let log = |of: &[&Point], picks: &[usize]| time(of, picks).known().map(f64::ln);
         let ratio = bootstrap(n, |p| Some(log(first, p)? - log(ladder, p)?)).map(exp);
+        let [of_first, mine] = [first, ladder].map(|of| time(of, &all));
+        let last = |of: &[&Point]| over(of, &all).last().map(|p| p.0);
+        // From below for the first method, from above for this one.
+        let slow = match of_first {
+            Reach::At(t) => Some(t),
+            Reach::Never => last(first),
+            Reach::Before(_) => None,
+        };
+        let fast = match mine {
+            Reach::At(t) | Reach::Before(t) => Some(t),
+            Reach::Never => None,
+        };
+        let bound = slow.zip(fast).map(|(s, f)| s / f);
         Level {
             error,
             seconds: bootstrap(n, |p| log(ladder, p)).map(exp),
-            at_most: match time(ladder, &all) {
+            at_most: match mine {
                 Reach::Before(t) => Some(t),
                 _ => None,
             },
+            more_than: match mine {
+                Reach::Never => last(ladder),
+                _ => None,
+            },
             differs: ratio.as_ref().is_some_and(|r| differs(r, floor)),
+            ratio_at_least: bound.filter(|b| ratio.is_none() && *b > floor),
             ratio,
         }
     });

@@ -76,7 +76,12 @@ pub fn page(
 fn row(cells: impl IntoIterator<Item = String>, tag: &str) -> String {
     let cells: String = cells
         .into_iter()
-        .map(|c| format!("<{tag}>{}</{tag}>", escape(&c)))
+        .map(|c| {
+            let c = escape(&c)
+                .replace(" [", " <small>[")
+                .replace(']', "]</small>");
+            format!("<{tag}>{c}</{tag}>")
+        })
         .collect();
     format!("<tr>{cells}</tr>\n")
 }
@@ -114,7 +119,7 @@ fn times(analysis: &Analysis) -> String {
 }
 
 fn points(analysis: &Analysis) -> String {
-    let mut out = String::from("<h2>All that was measured</h2>\n<table>\n");
+    let mut out = String::from("<h2>All that was measured</h2>\n<table class=\"points\">\n");
     out += &head(&[
         "",
         "settings",
@@ -154,7 +159,7 @@ fn effects(analysis: &Analysis) -> String {
     let mut out = format!(
         "<h2>What precision costs</h2>\n<p>One change at a time to photon mapping with {}. Factors: \
          below 1 is less. Their product is what counts if error can be had for time at a slope of \
-         −1.</p>\n<table>\n",
+         −1.</p>\n<table class=\"changes\">\n",
         escape(base)
     );
     out += &head(&["change", "time", "error", "time × error", ""]);

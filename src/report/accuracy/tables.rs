@@ -31,7 +31,9 @@ pub(super) fn seconds(l: &Level) -> String {
     match (&l.seconds, l.at_most) {
         (Some(i), _) => interval(i),
         (None, Some(t)) => format!("at most {}", short(t)),
-        (None, None) => "not reached".into(),
+        (None, None) => l
+            .more_than
+            .map_or("unknown".into(), |t| format!("more than {}", short(t))),
     }
 }
 
@@ -40,7 +42,9 @@ pub(super) fn ratio(l: &Level) -> String {
     match &l.ratio {
         Some(r) if l.differs => interval(r),
         Some(_) => "none".into(),
-        None => "unknown".into(),
+        None => l
+            .ratio_at_least
+            .map_or("unknown".into(), |b| format!("at least {}", short(b))),
     }
 }
 
