@@ -375,7 +375,7 @@ fn extremes_of_gathering_are_defined() {
                 let kernels = deciding.kernels(photons.clone(), area, |_| true, &control);
                 let irradiance = IrradianceMap::build(&map, Arc::new(kernels), |_| true, &control);
                 let site = Site::new(DVec3::ZERO, DVec3::Y);
-                let near = irradiance.nearest(&site, &mut Nearest::new());
+                let near = irradiance.nearest(&site);
                 assert!(
                     near.is_none_or(|s| s.irradiance().is_finite()),
                     "{name}, {k}"

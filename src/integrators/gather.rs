@@ -107,7 +107,7 @@ impl PhotonMapping<'_> {
 
         // The global map: seen by gather rays, or directly.
         if let Some(d) = &mut densities
-            && let Some(s) = stored.irradiance(&sites[0], scratch)
+            && let Some(s) = stored.irradiance(&sites[0])
         {
             d[0] += f64::from(s.density);
         }
@@ -122,7 +122,7 @@ impl PhotonMapping<'_> {
             }
             return light;
         }
-        light.indirect += stored.glow(&sites, bsdf, scratch);
+        light.indirect += stored.glow(&sites, bsdf);
         let share = 1.0 / n_gather;
         for _ in 0..gather_rays {
             let u = sampler.next_2d();
@@ -246,7 +246,7 @@ impl PhotonMapping<'_> {
         let cx = &self.cx;
         let stored = Stored::new(cx);
         let sites = sites(sp, bsdf);
-        let near = stored.irradiance(&sites[0], scratch);
+        let near = stored.irradiance(&sites[0]);
         let radius = near.map_or(0.0, |s| f64::from(s.radius));
         if sp.distance >= NEAR * radius || steps >= NEAR_STEPS {
             return match (bsdf.as_lambert(), near) {
@@ -256,7 +256,7 @@ impl PhotonMapping<'_> {
         }
         // Too near: direct light and glow here, the rest from one surface further. (Caustics here
         // are the glow of the surface that the gather ray left.)
-        let mut sum = stored.glow(&sites, bsdf, scratch);
+        let mut sum = stored.glow(&sites, bsdf);
         if let Some(direct) = sample_direct(cx, sp, bsdf, sampler.next_2d(), 1.0, 0.0) {
             scratch.rays.shadow += 1;
             if !cx.accel.occluded(&direct.ray) {

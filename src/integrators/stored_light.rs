@@ -63,13 +63,8 @@ impl Stored<'_> {
     }
 
     /// The irradiance estimated nearest to a site.
-    pub(super) fn irradiance(
-        &self,
-        site: &Site,
-        scratch: &mut Scratch,
-    ) -> Option<&IrradianceSample> {
-        let map = self.maps.irradiance.as_ref()?;
-        map.nearest(site, &mut scratch.nearest)
+    pub(super) fn irradiance(&self, site: &Site) -> Option<&IrradianceSample> {
+        self.maps.irradiance.as_ref()?.nearest(site)
     }
 
     /// Radiance that diffuse lobes which are not Lambert's send back, from all photons but
@@ -84,14 +79,14 @@ impl Stored<'_> {
 
     /// Radiance sent back of the light that caustics on other surfaces shed here. Diffuse lobes
     /// that are not Lambert's are taken by their albedo: this light comes from all around.
-    pub(super) fn glow(&self, sites: &[Site], bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
+    pub(super) fn glow(&self, sites: &[Site], bsdf: &Bsdf) -> Rgb {
         let Some(map) = &self.maps.glow else {
             return Rgb::ZERO;
         };
         let albedos = [bsdf.reflected_albedo(), bsdf.transmitted_albedo()];
         let mut sum = Rgb::ZERO;
         for (site, albedo) in sites.iter().zip(albedos) {
-            if let Some(s) = map.nearest(site, &mut scratch.nearest) {
+            if let Some(s) = map.nearest(site) {
                 sum += albedo * s.irradiance() * FRAC_1_PI;
             }
         }

@@ -54,10 +54,32 @@ impl Photon {
         unpack(self.ng)
     }
 
+    /// The geometric normal as it is stored.
+    #[inline]
+    pub(super) fn packed_ng(&self) -> PackedNormal {
+        PackedNormal(self.ng)
+    }
+
     /// Flux in W.
     #[inline]
     pub fn power(&self) -> Rgb {
         self.power.into()
+    }
+}
+
+/// A unit normal as photons store it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PackedNormal([i16; 2]);
+
+impl PackedNormal {
+    #[inline]
+    pub(super) fn new(ng: DVec3) -> Self {
+        Self(pack(ng))
+    }
+
+    #[inline]
+    pub(super) fn unpack(self) -> Vec3 {
+        unpack(self.0)
     }
 }
 

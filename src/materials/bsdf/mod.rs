@@ -339,6 +339,16 @@ impl Bsdf {
     /// Diffuse `f` (without cosine) toward `wi`, as density estimates need it.
     #[inline]
     pub fn diffuse_f(&self, wi: DVec3) -> Rgb {
+        if let Some(lobe) = self.lone_lambert() {
+            // Both cosines positive: on the side of wo, and not below the shading horizon.
+            let seen = wi.dot(self.ng) > 0.0 && wi.dot(self.main.frame.z) > 0.0;
+            return if seen { lobe.f() } else { Rgb::ZERO };
+        }
+        self.diffuse_f_stack(wi)
+    }
+
+    #[inline(never)]
+    fn diffuse_f_stack(&self, wi: DVec3) -> Rgb {
         let mut sum = Rgb::ZERO;
         for e in &self.lobes {
             if e.lobe.class() == LobeClass::Diffuse {

@@ -14,6 +14,14 @@ pub struct Lambert {
     pub albedo: Rgb,
 }
 
+impl Lambert {
+    /// Its value above the horizon.
+    #[inline]
+    pub(in crate::materials) fn f(&self) -> Rgb {
+        self.albedo * FRAC_1_PI
+    }
+}
+
 impl LobeModel for Lambert {
     #[inline]
     fn class(&self) -> LobeClass {
@@ -25,7 +33,7 @@ impl LobeModel for Lambert {
         if wi.z <= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        (self.albedo * FRAC_1_PI, warp::cosine_hemisphere_pdf(wi.z))
+        (self.f(), warp::cosine_hemisphere_pdf(wi.z))
     }
 
     #[inline(always)]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Kernels, Nearest, PhotonMap, Site};
+use super::{Kernels, PhotonMap, Site};
 use crate::color::Rgb;
 use crate::control::Control;
 use crate::photons::PhotonClass;
@@ -18,8 +18,6 @@ const BLOCK: usize = 1024;
 /// Irradiance at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct IrradianceSample {
-    /// Position.
-    pub p: [f32; 3],
     /// Irradiance in W/m².
     irradiance: [f32; 3],
     /// Radius of the kernel it was estimated with.
@@ -62,7 +60,6 @@ impl IrradianceMap {
                     stage.advance(BLOCK as u64);
                 }
                 IrradianceSample {
-                    p: site.p.into(),
                     irradiance: e.value.to_f32(),
                     radius: e.radius as f32,
                     density: e.density as f32,
@@ -84,7 +81,7 @@ impl IrradianceMap {
 
     /// The nearest sample on the same side of the same surface.
     #[inline]
-    pub fn nearest(&self, site: &Site, found: &mut Nearest) -> Option<&IrradianceSample> {
-        self.kernels.nearest(site, found).map(|i| &self.samples[i])
+    pub fn nearest(&self, site: &Site) -> Option<&IrradianceSample> {
+        self.kernels.nearest(site).map(|i| &self.samples[i])
     }
 }

@@ -1,16 +1,23 @@
-//! A balanced k-d tree without nodes: the items themselves are sorted so that the middle one of
-//! every range splits it.
+//! A balanced k-d tree: items in blocks at the leaves, and above them nothing but the planes that
+//! split, so that a search touches little memory.
+//!
+//! Source: for the distance to a cell, built up axis by axis on the way down, Arya and Mount,
+//! *Algorithms for Fast Vector Quantization*, DCC 1993.
 
 use crate::math::Vec3;
 
-/// Ranges up to this size are searched item by item.
-const LEAF: usize = 8;
+/// Items of a block. Their distances are computed side by side.
+const WIDTH: usize = 8;
 
 /// Ranges above this size are built in parallel.
 const PARALLEL: usize = 1 << 15;
 
 /// What a search is for.
 pub trait Search {
+    /// Whether of several items at hand the nearest is to be offered first, since with it the rest
+    /// may be out of bounds.
+    const NEAREST_FIRST: bool;
+
     /// Squared distance beyond which nothing is wanted any more.
     fn bound(&self) -> f32;
 
@@ -22,6 +29,8 @@ pub trait Search {
 pub struct Within<F>(pub f32, pub F);
 
 impl<F: FnMut(usize)> Search for Within<F> {
+    const NEAREST_FIRST: bool = false;
+
     #[inline]
     fn bound(&self) -> f32 {
         self.0
@@ -33,13 +42,70 @@ impl<F: FnMut(usize)> Search for Within<F> {
     }
 }
 
+/// Positions of items that follow each other, coordinate by coordinate.
+#[derive(Clone, Debug)]
+struct Block([[f32; WIDTH]; 3]);
+
+impl Block {
+    /// Of at most [`WIDTH`] items; what is missing lies at infinity, which no search reaches.
+    fn new<T>(items: &[T], position: &impl Fn(&T) -> [f32; 3]) -> Self {
+        let mut block = Self([[f32::INFINITY; WIDTH]; 3]);
+        for (j, item) in items.iter().enumerate() {
+            for (axis, x) in position(item).into_iter().enumerate() {
+                block.0[axis][j] = x;
+            }
+        }
+        block
+    }
+
+    #[inline]
+    fn position(&self, j: usize) -> Vec3 {
+        Vec3::new(self.0[0][j], self.0[1][j], self.0[2][j])
+    }
+
+    /// Squared distances from `p`.
+    #[inline]
+    fn distances(&self, p: [f32; 3]) -> [f32; WIDTH] {
+        std::array::from_fn(|j| {
+            squared([
+                self.0[0][j] - p[0],
+                self.0[1][j] - p[1],
+                self.0[2][j] - p[2],
+            ])
+        })
+    }
+}
+
+/// Squared length. Points and cells are measured by the same sum, so that rounding never takes a
+/// cell for farther than a point in it.
+#[inline]
+fn squared([x, y, z]: [f32; 3]) -> f32 {
+    x * x + y * y + z * z
+}
+
+/// A plane that splits a range of blocks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Plane {
+    at: f32,
+    axis: u32,
+}
+
+/// A range of blocks that a search has left for later.
+#[derive(Clone, Copy, Default)]
+struct Deferred {
+    lo: u32,
+    hi: u32,
+    /// Distances to its cell along the axes.
+    offset: [f32; 3],
+}
+
 /// The tree over a slice of items that it has sorted.
 #[derive(Debug, Default)]
 pub struct KdTree {
-    /// Positions in tree order, apart from the items: searches read little else.
-    points: Vec<[f32; 3]>,
-    /// Axis of the split at each position.
-    axes: Vec<u8>,
+    blocks: Vec<Block>,
+    /// Of the range that is split before block `i`, the plane; each block but the first begins
+    /// the second half of exactly one range.
+    planes: Vec<Plane>,
 }
 
 impl KdTree {
@@ -48,92 +114,122 @@ impl KdTree {
         items: &mut [T],
         position: impl Fn(&T) -> [f32; 3] + Sync,
     ) -> Self {
-        let mut axes = vec![0; items.len()];
-        split(items, &mut axes, &position);
+        let mut planes = vec![Plane::default(); items.len().div_ceil(WIDTH)];
+        split(items, &mut planes, &position);
         Self {
-            points: items.iter().map(position).collect(),
-            axes,
+            blocks: items
+                .chunks(WIDTH)
+                .map(|c| Block::new(c, &position))
+                .collect(),
+            planes,
         }
     }
 
+    /// Position of item `i`.
+    #[inline]
+    pub fn position(&self, i: usize) -> Vec3 {
+        self.blocks[i / WIDTH].position(i % WIDTH)
+    }
+
     /// Offers every item within the bound of `found` around `p` that `accept` takes; `accept`
-    /// gets the index and the squared radius that bounds the search at that moment.
+    /// gets the index, the position and the squared radius that bounds the search at that moment.
     #[inline]
     pub fn visit_near(
         &self,
         p: Vec3,
         found: &mut impl Search,
-        accept: impl Fn(usize, f32) -> bool,
+        accept: impl Fn(usize, Vec3, f32) -> bool,
     ) {
-        if self.points.is_empty() {
+        if self.blocks.is_empty() {
             return;
         }
         let p: [f32; 3] = p.into();
-        // Depth of a balanced tree over 2³² items is below 32; each level defers one range.
-        let mut stack = [(0u32, 0u32, 0f32); 40];
+        // A balanced tree over 2³² items is less deep; each level defers one range.
+        let mut stack = [Deferred::default(); 32];
         let mut top = 0;
-        let mut range = (0usize, self.points.len());
+        let mut at = Deferred {
+            hi: self.blocks.len() as u32,
+            ..Default::default()
+        };
         loop {
-            let (lo, hi) = range;
-            if hi - lo <= LEAF {
-                for i in lo..hi {
-                    self.test(p, i, found, &accept);
-                }
-            } else {
-                let mid = (lo + hi) / 2;
-                let axis = self.axes[mid] as usize;
-                let delta = p[axis] - self.points[mid][axis];
-                let (near, far) = if delta < 0.0 {
-                    ((lo, mid), (mid + 1, hi))
+            while at.hi - at.lo > 1 {
+                let mid = at.lo.midpoint(at.hi);
+                let plane = self.planes[mid as usize];
+                let delta = p[plane.axis as usize % 3] - plane.at;
+                // Not by an index: what is written to memory in parts is slow to be read whole.
+                let offset = [0, 1, 2].map(|k| {
+                    if plane.axis == k {
+                        delta
+                    } else {
+                        at.offset[k as usize]
+                    }
+                });
+                let mut far = Deferred { offset, ..at };
+                if delta < 0.0 {
+                    (at.hi, far.lo) = (mid, mid);
                 } else {
-                    ((mid + 1, hi), (lo, mid))
-                };
-                self.test(p, mid, found, &accept);
-                stack[top] = (far.0 as u32, far.1 as u32, delta * delta);
-                top += 1;
-                range = near;
-                continue;
+                    (at.lo, far.hi) = (mid, mid);
+                }
+                if squared(offset) < found.bound() {
+                    stack[top] = far;
+                    top += 1;
+                }
             }
+            self.offer(at.lo as usize, p, found, &accept);
             loop {
                 if top == 0 {
                     return;
                 }
                 top -= 1;
-                let (lo, hi, d2) = stack[top];
-                if d2 < found.bound() {
-                    range = (lo as usize, hi as usize);
+                at = stack[top];
+                if squared(at.offset) < found.bound() {
                     break;
                 }
             }
         }
     }
+}
 
-    #[inline]
-    fn test(
+impl KdTree {
+    /// Offers the items of one block.
+    #[inline(always)]
+    fn offer<S: Search>(
         &self,
+        block: usize,
         p: [f32; 3],
-        i: usize,
-        found: &mut impl Search,
-        accept: &impl Fn(usize, f32) -> bool,
+        found: &mut S,
+        accept: &impl Fn(usize, Vec3, f32) -> bool,
     ) {
-        let q = self.points[i];
-        let (x, y, z) = (q[0] - p[0], q[1] - p[1], q[2] - p[2]);
-        let d2 = x * x + y * y + z * z;
-        let bound = found.bound();
-        if d2 < bound && accept(i, bound) {
-            found.offer(i as u32, d2);
+        let items = &self.blocks[block];
+        let d2 = items.distances(p);
+        let within = |bound: f32| (0..WIDTH).fold(0u32, |m, j| m | (u32::from(d2[j] < bound) << j));
+        let mut left = within(found.bound());
+        while left != 0 {
+            let mut j = left.trailing_zeros() as usize;
+            if S::NEAREST_FIRST {
+                let others = (j + 1..WIDTH).filter(|k| left >> k & 1 == 1);
+                j = others.fold(j, |best, k| if d2[k] < d2[best] { k } else { best });
+            }
+            left &= !(1 << j);
+            let (i, bound) = (block * WIDTH + j, found.bound());
+            if d2[j] < bound && accept(i, items.position(j), bound) {
+                found.offer(i as u32, d2[j]);
+                if S::NEAREST_FIRST {
+                    left &= within(found.bound());
+                }
+            }
         }
     }
 }
 
-/// Sorts a range around its median along its longest axis, and both halves likewise.
+/// Sorts a range along its longest axis around the middle of its blocks, and both halves
+/// likewise. `planes` has an element for every block.
 fn split<T: Copy + Send>(
     items: &mut [T],
-    axes: &mut [u8],
+    planes: &mut [Plane],
     position: &(impl Fn(&T) -> [f32; 3] + Sync),
 ) {
-    let n = items.len();
-    if n <= LEAF {
+    if planes.len() <= 1 {
         return;
     }
     let mut lo = [f32::INFINITY; 3];
@@ -149,20 +245,26 @@ fn split<T: Copy + Send>(
     let axis = (0..3)
         .max_by(|&a, &b| extent(a).total_cmp(&extent(b)))
         .unwrap_or(0);
-    let mid = n / 2;
-    items.select_nth_unstable_by(mid, |a, b| position(a)[axis].total_cmp(&position(b)[axis]));
-    axes[mid] = axis as u8;
-    let (left, right) = items.split_at_mut(mid);
-    let (left_axes, right_axes) = axes.split_at_mut(mid);
-    let (right, right_axes) = (&mut right[1..], &mut right_axes[1..]);
+    let mid = planes.len() / 2;
+    let first = mid * WIDTH;
+    let (_, at, _) = items.select_nth_unstable_by(first, |a, b| {
+        position(a)[axis].total_cmp(&position(b)[axis])
+    });
+    planes[mid] = Plane {
+        at: position(at)[axis],
+        axis: axis as u32,
+    };
+    let n = items.len();
+    let (left, right) = items.split_at_mut(first);
+    let (left_planes, right_planes) = planes.split_at_mut(mid);
     if n > PARALLEL {
         rayon::join(
-            || split(left, left_axes, position),
-            || split(right, right_axes, position),
+            || split(left, left_planes, position),
+            || split(right, right_planes, position),
         );
     } else {
-        split(left, left_axes, position);
-        split(right, right_axes, position);
+        split(left, left_planes, position);
+        split(right, right_planes, position);
     }
 }
 
@@ -191,7 +293,7 @@ mod tests {
                 let q = Vec3::new(rng.next_1d() as f32, rng.next_1d() as f32, 0.0);
                 for (k, max) in [(1, 9.0f32), (10, 9.0), (60, 0.1)] {
                     found.reset(k, max * max);
-                    tree.visit_near(q, &mut found, |_, _| true);
+                    tree.visit_near(q, &mut found, |_, _, _| true);
                     let mut all: Vec<f32> = points
                         .iter()
                         .map(|p| (Vec3::from(*p) - q).length_squared())
@@ -216,7 +318,7 @@ mod tests {
         let tree = KdTree::build(&mut points, |p| *p);
         let mut found = Nearest::new();
         found.reset(50, 1.0);
-        tree.visit_near(Vec3::splat(0.5), &mut found, |_, _| true);
+        tree.visit_near(Vec3::splat(0.5), &mut found, |_, _, _| true);
         assert_eq!((found.len(), found.kernel().1), (50, 0.0));
     }
 }

@@ -11,7 +11,8 @@
 use rayon::prelude::*;
 
 use super::clearing::{Clearing, Plane, Surroundings};
-use super::{KdTree, Nearest, PhotonMap, Site};
+use super::nearest::Closest;
+use super::{KdTree, Nearest, PackedNormal, PhotonMap, Side, Site};
 use crate::control::Control;
 use crate::math::Vec3;
 use crate::photons::PhotonClass;
@@ -46,11 +47,10 @@ impl<'a> Kernel<'a> {
     }
 }
 
-/// Where a kernel was decided.
+/// What was decided at a site.
 #[derive(Clone, Copy, Debug)]
-struct KernelSite {
-    p: Vec3,
-    ng: Vec3,
+struct Decision {
+    ng: PackedNormal,
     radius: f32,
     /// Index of its clearing; open if there is none.
     clearing: u32,
@@ -61,8 +61,9 @@ const OPEN: u32 = u32::MAX;
 /// The kernels of a map.
 #[derive(Debug, Default)]
 pub struct Kernels {
+    /// Where kernels were decided: the tree has the positions.
     tree: KdTree,
-    sites: Vec<KernelSite>,
+    decisions: Vec<Decision>,
     clearings: Vec<Clearing>,
     /// The radius where no pilot photon came.
     widest: f32,
@@ -95,12 +96,12 @@ impl Pilot<'_> {
         let map = PhotonMap::build(photons, PILOT_NEAREST, area);
         let scale = (self.nearest as f64 / (PILOT_NEAREST as f64 * self.ratio)).sqrt();
         let widest = (super::REACH * even) as f32;
-        let decided: Vec<(KernelSite, Option<Clearing>)> = map
+        let decided: Vec<(Vec3, Decision, Option<Clearing>)> = map
             .photons()
             .par_chunks(1024)
             .flat_map_iter(|chunk| {
                 let mut found = Nearest::new();
-                let mut part: Vec<(KernelSite, Option<Clearing>)> = Vec::new();
+                let mut part: Vec<(Vec3, Decision, Option<Clearing>)> = Vec::new();
                 for photon in chunk {
                     let site = Site {
                         p: Vec3::from(photon.p),
@@ -111,39 +112,37 @@ impl Pilot<'_> {
                     let radius = radius.clamp(super::LEAST * widest, widest);
                     // Photons in one place need to be counted once only.
                     let apart = THINNING * radius;
-                    if part.last().is_some_and(|(last, _)| {
-                        last.p.distance_squared(site.p) < apart * apart && last.ng == site.ng
+                    if part.last().is_some_and(|(p, last, _)| {
+                        p.distance_squared(site.p) < apart * apart && last.ng == photon.packed_ng()
                     }) {
                         continue;
                     }
                     let clearing = self.around.look(&site, radius);
-                    let site = KernelSite {
-                        p: site.p,
-                        ng: site.ng,
+                    let decision = Decision {
+                        ng: photon.packed_ng(),
                         radius,
                         clearing: OPEN,
                     };
-                    part.push((site, clearing));
+                    part.push((site.p, decision, clearing));
                 }
                 stage.advance(chunk.len() as u64);
                 part
             })
             .collect();
         let mut clearings = Vec::new();
-        let mut sites: Vec<KernelSite> = decided
+        let mut sites: Vec<(Vec3, Decision)> = decided
             .into_iter()
-            .map(|(mut site, clearing)| {
+            .map(|(p, mut decision, clearing)| {
                 if let Some(c) = clearing {
-                    site.clearing = clearings.len() as u32;
+                    decision.clearing = clearings.len() as u32;
                     clearings.push(c);
                 }
-                site
+                (p, decision)
             })
             .collect();
-        let tree = KdTree::build(&mut sites, |s| s.p.into());
         Kernels {
-            tree,
-            sites,
+            tree: KdTree::build(&mut sites, |s| s.0.into()),
+            decisions: sites.into_iter().map(|s| s.1).collect(),
             clearings,
             widest,
         }
@@ -153,66 +152,68 @@ impl Pilot<'_> {
 impl Kernels {
     /// Number of sites.
     pub fn len(&self) -> usize {
-        self.sites.len()
+        self.decisions.len()
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.sites.is_empty()
+        self.decisions.is_empty()
     }
 
     /// The sites themselves.
     pub fn sites(&self) -> impl IndexedParallelIterator<Item = Site> + '_ {
-        self.sites.par_iter().map(|s| Site { p: s.p, ng: s.ng })
+        (0..self.len()).into_par_iter().map(|i| self.site(i))
     }
 
-    fn of(&self, s: &KernelSite) -> Kernel<'_> {
-        let clearing = self.clearings.get(s.clearing as usize);
-        Kernel {
-            radius: s.radius,
-            plane: clearing.map(|c| (c, s.p, s.ng)),
+    fn site(&self, i: usize) -> Site {
+        Site {
+            p: self.tree.position(i),
+            ng: self.decisions[i].ng.unpack(),
         }
     }
 
     /// The kernel decided at a site of a number.
     pub fn at(&self, i: usize) -> Kernel<'_> {
-        self.of(&self.sites[i])
+        let decision = &self.decisions[i];
+        let clearing = self.clearings.get(decision.clearing as usize);
+        let radius = decision.radius;
+        Kernel::around(&self.site(i), radius, clearing)
     }
 
     /// The nearest site on the same side of the same surface that has looked at what lies around
     /// `site`.
     #[inline]
-    pub fn nearest(&self, site: &Site, found: &mut Nearest) -> Option<usize> {
+    pub fn nearest(&self, site: &Site) -> Option<usize> {
+        let side = Side::new(site);
         // Nearly always something lies close by; the wide search is for dark regions.
-        for reach in [0.25, 1.0] {
+        [0.25, 1.0].into_iter().find_map(|reach| {
             let r = self.widest * reach;
-            found.reset(1, r * r);
-            self.tree.visit_near(site.p, found, |i, _| {
-                let s = &self.sites[i];
-                site.accepts(s.p.into(), s.ng, r * r)
-                    && match self.of(s).plane() {
-                        Some(plane) => plane.contains(site.p),
+            let mut found = Closest::new(r * r);
+            self.tree.visit_near(site.p, &mut found, |i, p, _| {
+                let d = &self.decisions[i];
+                side.accepts(p, d.ng, r * r)
+                    && if d.clearing == OPEN {
                         // Twice the radius is open, so that all of a kernel here is, too.
-                        None => site.p.distance_squared(s.p) <= s.radius * s.radius,
+                        site.p.distance_squared(p) <= d.radius * d.radius
+                    } else {
+                        let plane = self.at(i).plane();
+                        plane.is_some_and(|plane| plane.contains(site.p))
                     }
             });
-            if let Some((i, _)) = found.iter().next() {
-                return Some(i);
-            }
-        }
-        None
+            found.item.map(|i| i as usize)
+        })
     }
 
     /// The radius at a site that none has looked at: that of the nearest, and the widest where
     /// none is near.
-    pub(super) fn radius(&self, site: &Site, found: &mut Nearest) -> f32 {
-        found.reset(1, self.widest * self.widest);
-        self.tree.visit_near(site.p, found, |i, r2| {
-            let s = &self.sites[i];
-            site.accepts(s.p.into(), s.ng, r2)
+    pub(super) fn radius(&self, site: &Site) -> f32 {
+        let mut found = Closest::new(self.widest * self.widest);
+        let side = Side::new(site);
+        self.tree.visit_near(site.p, &mut found, |i, p, r2| {
+            side.accepts(p, self.decisions[i].ng, r2)
         });
-        match found.iter().next() {
-            Some((i, d2)) => self.sites[i].radius.max(d2.sqrt()),
+        match found.item {
+            Some(i) => self.decisions[i as usize].radius.max(found.d2.sqrt()),
             None => self.widest,
         }
     }

@@ -15,7 +15,7 @@ pub use nearest::Nearest;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::photon::{Photon, PhotonClass};
+use super::photon::{PackedNormal, Photon, PhotonClass};
 use crate::color::Rgb;
 use crate::geometry::Shape;
 use crate::math::{DVec3, Vec3};
@@ -59,13 +59,33 @@ impl Site {
             ng: ng.as_vec3(),
         }
     }
+}
+
+/// The side of a surface that a site is on: kernels never reach through a wall.
+struct Side {
+    p: Vec3,
+    ng: Vec3,
+    packed: PackedNormal,
+}
+
+impl Side {
+    #[inline]
+    fn new(site: &Site) -> Self {
+        Self {
+            p: site.p,
+            ng: site.ng,
+            packed: PackedNormal::new(site.ng.as_dvec3()),
+        }
+    }
 
     /// Whether a photon or sample at `q` with normal `n` belongs to the same side of the same
-    /// surface, for a kernel of squared radius `r2`: kernels never reach through a wall.
+    /// surface, for a kernel of squared radius `r2`.
     #[inline]
-    fn accepts(&self, q: [f32; 3], n: Vec3, r2: f32) -> bool {
-        let height = (Vec3::from(q) - self.p).dot(self.ng);
-        n.dot(self.ng) >= NORMAL_AGREEMENT && height * height <= FLATNESS * FLATNESS * r2
+    fn accepts(&self, q: Vec3, n: PackedNormal, r2: f32) -> bool {
+        let height = (q - self.p).dot(self.ng);
+        height * height <= FLATNESS * FLATNESS * r2
+            // Where surfaces are flat nothing needs to be unpacked.
+            && (n == self.packed || n.unpack().dot(self.ng) >= NORMAL_AGREEMENT)
     }
 }
 
@@ -122,9 +142,9 @@ impl PhotonMap {
     /// searched.
     fn spread(&self, site: &Site, found: &mut Nearest) -> f32 {
         found.reset(self.nearest, self.max_radius * self.max_radius);
-        self.tree.visit_near(site.p, found, |i, r2| {
-            let photon = &self.photons[i];
-            site.accepts(photon.p, photon.ng(), r2)
+        let side = Side::new(site);
+        self.tree.visit_near(site.p, found, |i, p, r2| {
+            side.accepts(p, self.photons[i].packed_ng(), r2)
         });
         found.kernel().1.sqrt()
     }
@@ -159,11 +179,11 @@ impl PhotonMap {
         let Some(kernels) = &self.kernels else {
             return self.estimate_nearest(site, found, keep, f);
         };
-        if let Some(i) = kernels.nearest(site, found) {
+        if let Some(i) = kernels.nearest(site) {
             return self.estimate_within(site, kernels.at(i), keep, f);
         }
         // In the dark, or in a nook: only if there are photons, their surroundings are looked at.
-        let radius = kernels.radius(site, found);
+        let radius = kernels.radius(site);
         let bare = self.estimate_within(site, Kernel::around(site, radius, None), &keep, &f);
         if bare.density == 0.0 {
             return bare;
@@ -195,11 +215,12 @@ impl PhotonMap {
             sum += f(photon.wi()) * photon.power();
             counted += 1;
         });
-        self.tree.visit_near(site.p, &mut search, |i, r2| {
+        let side = Side::new(site);
+        self.tree.visit_near(site.p, &mut search, |i, p, r2| {
             let photon = &self.photons[i];
             keep(photon.class)
-                && site.accepts(photon.p, photon.ng(), r2)
-                && plane.as_ref().is_none_or(|c| c.contains(photon.p.into()))
+                && side.accepts(p, photon.packed_ng(), r2)
+                && plane.as_ref().is_none_or(|c| c.contains(p))
         });
         if counted == 0 {
             return Estimate {
@@ -233,9 +254,10 @@ impl PhotonMap {
     ) -> Estimate {
         let max2 = self.max_radius * self.max_radius;
         found.reset(self.nearest, max2);
-        self.tree.visit_near(site.p, found, |i, r2| {
+        let side = Side::new(site);
+        self.tree.visit_near(site.p, found, |i, p, r2| {
             let photon = &self.photons[i];
-            keep(photon.class) && site.accepts(photon.p, photon.ng(), r2)
+            keep(photon.class) && side.accepts(p, photon.packed_ng(), r2)
         });
         let (mut full, mut r2) = found.kernel();
         if found.is_empty() {

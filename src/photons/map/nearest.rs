@@ -1,4 +1,4 @@
-//! The `k` nearest of what a search offers.
+//! The nearest of what a search offers.
 
 use super::kdtree::Search;
 
@@ -75,6 +75,8 @@ impl Nearest {
 }
 
 impl Search for Nearest {
+    const NEAREST_FIRST: bool = false;
+
     #[inline]
     fn bound(&self) -> f32 {
         self.max2
@@ -97,5 +99,39 @@ impl Search for Nearest {
             self.sift_down(0);
             self.max2 = self.heap[0].0;
         }
+    }
+}
+
+/// The one nearest of what a search offers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Closest {
+    /// Which, if any was offered.
+    pub(super) item: Option<u32>,
+    /// Its squared distance; that of the search if there is none.
+    pub(super) d2: f32,
+}
+
+impl Closest {
+    /// A search within squared distance `max2`.
+    #[inline]
+    pub(super) fn new(max2: f32) -> Self {
+        Self {
+            item: None,
+            d2: max2,
+        }
+    }
+}
+
+impl Search for Closest {
+    const NEAREST_FIRST: bool = true;
+
+    #[inline]
+    fn bound(&self) -> f32 {
+        self.d2
+    }
+
+    #[inline]
+    fn offer(&mut self, i: u32, d2: f32) {
+        *self = Self { item: Some(i), d2 };
     }
 }
