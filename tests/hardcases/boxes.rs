@@ -8,7 +8,7 @@ use dualight::math::{DVec3, Vec3};
 use dualight::sampling::Rng;
 
 use crate::report::{Meter, Row};
-use crate::scenes::{backends, ball, in_cube, mesh, plane};
+use crate::scenes::{backends, ball, in_cube, mesh, plane, spheres};
 
 pub fn b1(row: &mut Row) {
     let g = crate::common::box_scene().geometry;
@@ -145,15 +145,23 @@ pub fn b4(row: &mut Row) {
 
 pub fn b5(row: &mut Row) {
     let [mut unexplained, mut same] = [Meter::default(); 2];
-    for (k, m) in [
-        plane(60, DVec3::ZERO, 2.0),
-        ball(30, DVec3::ZERO, 1.0),
-        ball(9, DVec3::splat(1e3), 1.0),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let g = mesh(m);
+    let mut list = vec![
+        mesh(plane(60, DVec3::ZERO, 2.0)),
+        mesh(plane(3, DVec3::splat(1e4), 200.0)),
+        mesh(ball(30, DVec3::ZERO, 1.0)),
+        mesh(ball(9, DVec3::splat(1e3), 1.0)),
+        mesh(ball(60, DVec3::ZERO, 1e-4)),
+        mesh(ball(60, DVec3::ZERO, 1e4)),
+        spheres(&[(DVec3::ZERO, 1.0)]),
+        spheres(&[(DVec3::X, 1.0), (DVec3::NEG_X, 1.0)]),
+    ];
+    let mut rng = Rng::new(49);
+    let cloud: Vec<_> = (0..300)
+        .map(|_| (in_cube(&mut rng), 0.2 * rng.next_1d()))
+        .collect();
+    list.push(spheres(&cloud));
+    list.push(crate::common::box_scene().geometry);
+    for (k, g) in list.into_iter().enumerate() {
         let around = g.bounds().bounding_sphere();
         let [a, b] = ["bvh", ACCELERATORS[0].name].map(|name| {
             let e = ACCELERATORS.iter().find(|e| e.name == name).unwrap();
@@ -165,7 +173,7 @@ pub fn b5(row: &mut Row) {
             reference: &*a,
         };
         let mut rng = Rng::new(50 + k as u64);
-        for _ in 0..100_000 {
+        for _ in 0..30_000 {
             let o = around.center + in_cube(&mut rng) * around.radius * 2.0;
             let f = check.intersect(&Ray::new(o, around.center + in_cube(&mut rng) - o));
             unexplained.must(f.class != Class::Unexplained);

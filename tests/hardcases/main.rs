@@ -9,6 +9,7 @@
 mod boxes;
 #[path = "../common/mod.rs"]
 mod common;
+mod deposits;
 mod dual;
 mod duals;
 mod exact;
@@ -19,19 +20,9 @@ mod scenes;
 mod spheres;
 mod triangles;
 
-use report::Row;
+use report::rows;
 
-macro_rules! rows {
-    ($($id:ident: $name:literal in $file:ident;)*) => {
-        const ROWS: &[(&str, &str, fn(&mut Row))] = &[$((stringify!($id), $name, $file::$id)),*];
-        $(#[test]
-        fn $id() {
-            check(stringify!($id), $name, $file::$id);
-        })*
-    };
-}
-
-rows! {
+rows! { "hardcases";
     s1: "head-on unit sphere" in spheres;
     s2: "start at the centre and inside" in spheres;
     s3: "start on the surface, outward" in spheres;
@@ -89,59 +80,4 @@ rows! {
     p1: "bookkeeping of flux" in photons;
     p3: "extremes of gathering" in photons;
     p4: "thin wall" in photons;
-}
-
-fn run(id: &'static str, name: &'static str, body: fn(&mut Row)) -> Row {
-    let mut row = Row::new(id, name);
-    body(&mut row);
-    row
-}
-
-fn check(id: &'static str, name: &'static str, body: fn(&mut Row)) {
-    let failures = run(id, name, body).failures();
-    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
-}
-
-/// Writes `docs/hardcases.md`.
-#[test]
-#[ignore = "writes a file"]
-fn write_the_table() {
-    let mut table = String::new();
-    let mut notes = String::new();
-    let mut failures = Vec::new();
-    for (id, name, body) in ROWS {
-        let row = run(id, name, *body);
-        row.markdown(&mut table, &mut notes);
-        failures.extend(row.failures());
-    }
-    let path = "docs/hardcases.md";
-    let old = std::fs::read_to_string(path).unwrap();
-    let part = |text: &str, mark: &str| text.split_once(mark).unwrap().0.to_string();
-    let (head, rest) = (
-        part(&old, BEGIN),
-        old.split_once(END).unwrap().1.to_string(),
-    );
-    let header = "| row | case | path | what is measured | cases | worst | bound |\n\
-                  |---|---|---|---|---:|---:|---:|\n";
-    let text = format!("{head}{BEGIN}\n{header}{table}\n### Notes\n\n{notes}{END}{rest}");
-    std::fs::write(path, text).unwrap();
-    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
-}
-
-const BEGIN: &str = "<!-- written by tests/hardcases: begin -->";
-const END: &str = "<!-- end -->";
-
-/// The table in the documents has every row.
-#[test]
-fn the_table_lists_every_row() {
-    let text = std::fs::read_to_string("docs/hardcases.md").unwrap();
-    for (id, name, _) in ROWS {
-        let id = id.to_uppercase();
-        let listed =
-            text.contains(&format!("| {id} | {name} |")) || text.contains(&format!("**{id}**"));
-        assert!(
-            listed,
-            "{id} {name} is not in docs/hardcases.md; write it again"
-        );
-    }
 }

@@ -51,6 +51,7 @@ pub fn r1(row: &mut Row) {
         cos_t,
         2.0 * f64::EPSILON.sqrt(),
     );
+    row.note("derivatives through two refractions: D9");
 }
 
 pub fn r2(row: &mut Row) {

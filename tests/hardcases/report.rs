@@ -1,7 +1,100 @@
 //! What a row of the catalogue reports: for every path what was tried, how often, the worst case
-//! and the bound.
+//! and the bound; and the table of rows in the documents, of which each test binary keeps a part.
+#![allow(dead_code, reason = "each test binary uses its own part")]
+#![allow(
+    unreachable_pub,
+    reason = "shared by binaries, each a crate of its own"
+)]
 
 use std::fmt::Write;
+
+const DOCUMENT: &str = "docs/hardcases.md";
+
+/// The name of a row and what measures it.
+pub type Case = (&'static str, &'static str, fn(&mut Row));
+
+/// Declares the rows of a test binary: one test each; one more, ignored, that writes their part
+/// of the table; and one that holds the document to be complete.
+macro_rules! rows {
+    ($part:literal; $($id:ident: $name:literal in $file:ident;)*) => {
+        const ROWS: &[report::Case] = &[$((stringify!($id), $name, $file::$id)),*];
+        $(#[test]
+        fn $id() {
+            report::check($part, &(stringify!($id), $name, $file::$id));
+        })*
+
+        #[test]
+        #[ignore = "writes a file"]
+        fn write_the_table() {
+            report::write($part, ROWS);
+        }
+
+        #[test]
+        fn the_table_lists_every_row() {
+            report::listed($part, ROWS);
+        }
+    };
+}
+pub(crate) use rows;
+
+fn run(case: &Case) -> Row {
+    let mut row = Row::new(case.0, case.1);
+    (case.2)(&mut row);
+    row
+}
+
+/// Measures a row, and holds it to its bounds and the document to what it measured.
+pub fn check(part: &str, case: &Case) {
+    let row = run(case);
+    let mut failures = row.failures();
+    let text = std::fs::read_to_string(DOCUMENT).unwrap();
+    let table = sections(&text, part)[1];
+    failures.extend(row.missing(table));
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+/// The document before, in and after the part of a test binary.
+fn sections<'a>(text: &'a str, part: &str) -> [&'a str; 3] {
+    let begin = format!("<!-- written by tests/{part}: begin -->\n");
+    let (head, rest) = text.split_once(&begin).unwrap();
+    let (own, _) = rest.split_once("<!-- end -->").unwrap();
+    [&text[..head.len() + begin.len()], own, &rest[own.len()..]]
+}
+
+/// Writes a part of the document.
+pub fn write(part: &str, cases: &[Case]) {
+    let mut table = String::new();
+    let mut notes = String::new();
+    let mut failures = Vec::new();
+    for case in cases {
+        let row = run(case);
+        row.markdown(&mut table, &mut notes);
+        failures.extend(row.failures());
+    }
+    let old = std::fs::read_to_string(DOCUMENT).unwrap();
+    let [head, _, rest] = sections(&old, part);
+    let header = "| row | case | path | what is measured | cases | worst | bound |\n\
+                  |---|---|---|---|---:|---:|---:|\n";
+    if !notes.is_empty() {
+        notes.insert_str(0, "\nNotes:\n\n");
+    }
+    let text = format!("{head}{header}{table}{notes}{rest}");
+    std::fs::write(DOCUMENT, text).unwrap();
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+/// Insists that a part of the document has every row.
+pub fn listed(part: &str, cases: &[Case]) {
+    let text = std::fs::read_to_string(DOCUMENT).unwrap();
+    let own = sections(&text, part)[1];
+    for (id, name, _) in cases {
+        let id = id.to_uppercase();
+        assert!(
+            own.contains(&format!("| {id} | {name} |")) || own.contains(&format!("**{id}**")),
+            "{id} {name} is not in {DOCUMENT}; write it again"
+        );
+    }
+}
 
 /// Keeps the worst of what it sees.
 #[derive(Clone, Copy, Debug, Default)]
@@ -78,6 +171,27 @@ impl Row {
                     "{} {}, {}, {}: worst {:e} of {}, bound {:e}",
                     self.id, self.name, l.path, l.quantity, l.meter.worst, l.meter.n, l.bound
                 )
+            })
+            .collect()
+    }
+
+    /// What was measured, and with which bound, but is not in the document's table.
+    pub fn missing(&self, table: &str) -> Vec<String> {
+        self.lines
+            .iter()
+            .filter_map(|l| {
+                let begin = format!(
+                    "| {} | {} | {} | {} |",
+                    self.id.to_uppercase(),
+                    self.name,
+                    l.path,
+                    l.quantity
+                );
+                let end = format!("| {} |", number(l.bound));
+                let found = table
+                    .lines()
+                    .any(|t| t.starts_with(&begin) && t.ends_with(&end));
+                (!found).then(|| format!("{begin} …{end} is not in {DOCUMENT}; write it again"))
             })
             .collect()
     }

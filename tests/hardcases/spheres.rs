@@ -7,7 +7,8 @@ use dualight::math::{DAffine3, DQuat, DVec3, Vec3};
 use dualight::sampling::Rng;
 use std::sync::Arc;
 
-use crate::dual::{by, variables};
+use crate::deposits;
+use crate::dual::{Seen, by, variables};
 use crate::exact::ExactSphere;
 use crate::report::{Meter, Row};
 use crate::scenes::{backends, object, on_sphere, refined, relative, spheres};
@@ -44,6 +45,12 @@ pub fn s1(row: &mut Row) {
         row.line(name, "refined distance, relative", t, 2.0 * f64::EPSILON);
         row.line(name, "position and normal", p, 2.0 * f64::EPSILON);
     }
+    let mut seen = Seen::default();
+    for scale in [1.0, 3.0, 1e15, 1e-15] {
+        let o = DVec3::new(0.0, 0.0, -5.0);
+        seen.sphere(o, DVec3::Z * scale, DVec3::ZERO, 1.0, false);
+    }
+    seen.report(row, 1e-15, 1e-15);
 }
 
 pub fn s2(row: &mut Row) {
@@ -71,6 +78,18 @@ pub fn s2(row: &mut Row) {
         row.line(name, "distance from inside, of max(t, r)", inside, 1e-9);
         row.line(name, "normals that do not point outward", outward, 0.0);
     }
+    let mut seen = Seen::default();
+    let mut rng = Rng::new(2);
+    for _ in 0..5000 {
+        let d = on_sphere(&mut rng).as_vec3().as_dvec3();
+        seen.sphere(DVec3::ZERO, d, DVec3::ZERO, 2.0, true);
+        let o = (on_sphere(&mut rng) * (2.0 * 0.999_999))
+            .as_vec3()
+            .as_dvec3();
+        seen.sphere(o, d, DVec3::ZERO, 2.0, true);
+    }
+    // At a grazing exit the gradient is 1/cos, and its error 1/cos² of the rounding.
+    seen.report(row, 1e-12, 1e-9);
     row.note(
         "directions that are unit up to their rounding are normalised by one Newton step, \
               which leaves 1e-13: the bound of one last place is for directions of another length",
@@ -244,6 +263,18 @@ pub fn s9(row: &mut Row) {
         }
         row.line(name, "hits that are not finite", m, 0.0);
     }
+    let mut sign = Meter::default();
+    let mut rng = Rng::new(9);
+    for _ in 0..2000 {
+        let out = on_sphere(&mut rng);
+        let side = out.any_orthonormal_vector();
+        let o = (out * 1e7).as_vec3().as_dvec3();
+        let d = (side * 0.12 * rng.next_1d() - o).as_vec3().as_dvec3();
+        let (ours, exact) = signs(o, d, DVec3::ZERO, f64::from(0.1f32));
+        sign.must(ours == exact);
+    }
+    row.line("dual", "wrong signs of the discriminant", sign, 0.0);
+    deposits::specks(row);
     let mut b = dualight::scene::SceneBuilder::default();
     let grey = crate::common::lambert("grey", dualight::color::Rgb::splat(0.5));
     let grey = b.add_material(&grey).unwrap();
@@ -284,6 +315,17 @@ pub fn s10(row: &mut Row) {
         row.line(path, "own distance, relative", raw, 0.5);
         row.line(path, "refined distance, relative", distance, 1e-9);
     }
+    let mut seen = Seen::default();
+    for r in [1e3, 1e4, 1e5, 1e6] {
+        for i in 0..500 {
+            let h = 0.5 + 9.5 * f64::from(i % 20) / 19.0;
+            let a = f64::from(i) * 0.16f64.to_radians();
+            let d = DVec3::new(a.sin(), -a.cos(), 0.0).as_vec3().as_dvec3();
+            let o = (DVec3::Y * h).as_vec3().as_dvec3();
+            seen.sphere(o, d, DVec3::Y * -r, r, false);
+        }
+    }
+    seen.report(row, 1e-9, 1e-9);
     row.note(
         "the own distance of a single-precision backend loses up to u·r of t; nothing relies on it",
     );
@@ -376,6 +418,7 @@ pub fn s13(row: &mut Row) {
         objects: vec![object(0, Some(world))],
     });
     let inverse = g.objects[0].placement.unwrap().object_from_world;
+    let mut seen = Seen::default();
     for (name, accel) in backends(&g) {
         let [mut t, mut n] = [Meter::default(); 2];
         let mut rng = Rng::new(13);
@@ -394,6 +437,9 @@ pub fn s13(row: &mut Row) {
                 continue;
             };
             let t_hit = sp.distance / ray.direction().length();
+            if name == "bvh" {
+                seen.sphere(lo, ld, DVec3::ZERO, 1.0, false);
+            }
             t.see(
                 roots
                     .iter()
@@ -408,6 +454,8 @@ pub fn s13(row: &mut Row) {
         // The normal of a place on the disc of 1 cm turns by 1e4 times the error of the place.
         row.line(name, "normal against the inverse transpose", n, 1e-6);
     }
+    // As the discriminant's: at the rim the root has half of the digits.
+    seen.report(row, 1e-6, 1e-6);
 }
 
 pub fn s14(row: &mut Row) {
@@ -428,6 +476,7 @@ pub fn s14(row: &mut Row) {
             row.line(name, "inner shell not found after the outer", m, 0.0);
         }
     }
+    deposits::shells(row);
 }
 
 pub fn s15(row: &mut Row) {
@@ -443,6 +492,7 @@ pub fn s15(row: &mut Row) {
         }
         row.line(name, "another answer, or not the lowest number", m, 0.0);
     }
+    deposits::coincident_spheres(row);
     row.note("Embree names any one of coincident spheres, but always the same one for a ray");
 }
 
@@ -490,4 +540,21 @@ pub fn s17(row: &mut Row) {
         }
         row.line(name, "hits that are not finite", m, 0.0);
     }
+    let mut m = Meter::default();
+    for scale in [1.0f32, 1e18, 1e-18] {
+        for i in 0..odd.len().pow(3) {
+            let pick = |k: u32| f64::from(odd[i / odd.len().pow(k) % odd.len()] * scale);
+            let d = DVec3::new(pick(0), pick(1), pick(2));
+            if d == DVec3::ZERO {
+                continue;
+            }
+            let o = DVec3::new(0.0, 0.0, -5.0);
+            let [vo, vd] = variables(o, d);
+            let line = sphere::line_sphere(vo, vd, DVec3::ZERO, 1.0);
+            let exact = ExactSphere::new(o, d, DVec3::ZERO, 1.0);
+            let same = (line.discriminant.value() >= 0.0) == (exact.discriminant.sign() >= 0);
+            m.must(same && line.roots().is_none_or(|r| r[0].value().is_finite()));
+        }
+    }
+    row.line("dual", "wrong sign, or a root that is not finite", m, 0.0);
 }

@@ -10,6 +10,8 @@ use dualight::math::DVec3;
 use dualight::math::robust::UNIT_ROUNDOFF as U;
 use dualight::sampling::Rng;
 
+use crate::deposits;
+use crate::dual::Seen;
 use crate::exact::ExactTriangle;
 use crate::report::{Meter, Row};
 use crate::scenes::{backends, ball, in_cube, mesh, on_sphere, plane, refined, relative, triangle};
@@ -70,6 +72,24 @@ fn one(g: &Arc<Geometry>, accel: &dyn Accelerator, far: f64, n: usize, least: f6
     [raw, uv, t, missed]
 }
 
+/// As [`one`], by the intersection that carries derivatives.
+fn derivatives(row: &mut Row, v: [DVec3; 3], far: f64, least: f64, bounds: [f64; 2]) {
+    let v = v.map(|p| p.as_vec3().as_dvec3());
+    let normal = (v[1] - v[0]).cross(v[2] - v[0]).normalize();
+    let mut rng = Rng::new(31);
+    let mut seen = Seen::default();
+    for _ in 0..400 {
+        let (a, b) = (0.05 + 0.4 * rng.next_1d(), 0.05 + 0.4 * rng.next_1d());
+        let target = v[0] + (v[1] - v[0]) * a + (v[2] - v[0]) * b;
+        let out = on_sphere(&mut rng);
+        if out.dot(normal).abs() >= least {
+            let o = (target + out * far).as_vec3().as_dvec3();
+            seen.triangle(o, (target - o).as_vec3().as_dvec3(), v);
+        }
+    }
+    seen.report(row, bounds[0], bounds[1]);
+}
+
 /// A row on single triangles: `(edge, distance)`, bounds of own and refined barycentrics.
 fn singles(row: &mut Row, sizes: &[(f64, f64)], raw: f64, uv: f64, least: f64) {
     for &(edge, far) in sizes {
@@ -117,6 +137,13 @@ pub fn t1(row: &mut Row) {
         row.line(name, "own t, u, v in last places of 1", raw, 16.0);
         row.line(name, "refined t, u, v, normal", fine, 1e-15);
     }
+    let mut seen = Seen::default();
+    for i in 0..256u32 {
+        let at = |k: u32| f64::from(k) / 32.0 + 0.01;
+        let ray = Ray::new(DVec3::new(at(i % 16), at(i / 16), 3.0), -DVec3::Z);
+        seen.triangle(ray.origin(), ray.direction(), corners(&g, 0));
+    }
+    seen.report(row, 1e-15, 1e-15);
 }
 
 /// Rays from inside a closed ball or above a plane, at what `target` picks: how many are lost.
@@ -371,11 +398,16 @@ pub fn t7(row: &mut Row) {
                 row.line(name, "refined barycentrics", uv, 1e-13 * 10.0 / h);
             }
         }
+        derivatives(row, v, 10.0, 0.3, [1e-13 * 10.0 / h, 1e-12]);
     }
 }
 
 pub fn t8(row: &mut Row) {
     singles(row, &[(1e-4, 1.0), (1e-6, 1e-2)], 64.0, 1e-9, 0.3);
+    for (edge, far) in [(1e-4, 1.0), (1e-6, 1e-2)] {
+        let v = [DVec3::ZERO, DVec3::X * edge, DVec3::Y * edge];
+        derivatives(row, v, far, 0.3, [1e-9, 1e-12]);
+    }
 }
 
 pub fn t9(row: &mut Row) {
@@ -387,6 +419,8 @@ pub fn t9(row: &mut Row) {
         row.line(name, "refined distance, relative", t, 1e-9);
         row.line(name, "missed", missed, 0.0);
     }
+    let v = [DVec3::ZERO, DVec3::X * edge, DVec3::Y * edge];
+    derivatives(row, v, far, 0.3, [1e-9, 1e-12]);
     row.note("Embree's own barycentrics are 0, 0 here; nothing relies on them but opacity");
 }
 
@@ -398,6 +432,7 @@ pub fn t11(row: &mut Row) {
     let g = mesh(triangle([DVec3::new(-1.0, -1.0, 0.0), DVec3::X, DVec3::Y]));
     for degrees in [1.0f64, 0.01, 1e-4] {
         let (sin, cos) = degrees.to_radians().sin_cos();
+        let mut seen = Seen::default();
         for (name, accel) in backends(&g) {
             let [mut t, mut missed] = [Meter::default(); 2];
             let mut rng = Rng::new(19);
@@ -410,6 +445,9 @@ pub fn t11(row: &mut Row) {
                 let exact = ExactTriangle::new(ray.origin(), ray.direction(), corners(&g, 0));
                 if !exact.inside() {
                     continue;
+                }
+                if name == "bvh" {
+                    seen.triangle(ray.origin(), ray.direction(), corners(&g, 0));
                 }
                 let hit = accel.intersect(&ray);
                 missed.must(hit.is_some_and(|h| h.t >= 0.0));
@@ -433,6 +471,7 @@ pub fn t11(row: &mut Row) {
                 0.0,
             );
         }
+        seen.report(row, 1e-15 / sin, 1e-15 / sin);
     }
 }
 
@@ -545,6 +584,7 @@ pub fn t15(row: &mut Row) {
         }
         row.line(name, "another answer, or a second hit", m, 0.0);
     }
+    deposits::coincident_walls(row);
 }
 
 pub fn t16(row: &mut Row) {
@@ -588,9 +628,9 @@ pub fn t16(row: &mut Row) {
             }
         }
     }
+    deposits::slabs(row);
     row.note(
-        "what passes a slab is compared with the closed form in tests/transport.rs and \
-         tests/specular.rs. A slab must be thicker than the spawn offset 16·u·x of its corners: \
+        "pictures through slabs are compared with the closed form in tests/specular.rs. A slab must be thicker than the spawn offset 16·u·x of its corners: \
          1e-4 and 1e-5 at x = 1000 are not tried",
     );
 }
@@ -618,5 +658,6 @@ pub fn t20(row: &mut Row) {
         let n = m.n as f64;
         row.line(name, "lost at a T-junction", m, n);
     }
+    deposits::junction(row);
     row.note("a T-junction is not watertight by its data: what is lost is told, not bounded");
 }
