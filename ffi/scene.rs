@@ -83,12 +83,26 @@ impl SceneBuilder {
     ///
     /// If memory runs out.
     pub fn new(device: &Device) -> Result<Self, EmbreeError> {
+        Self::with_flags(device, RTCSceneFlags::ROBUST)
+    }
+
+    /// An empty scene to be traversed fast: rays may pass between neighbours that share an edge.
+    /// What the others are measured against, not what renders.
+    ///
+    /// # Errors
+    ///
+    /// If memory runs out.
+    pub fn fast(device: &Device) -> Result<Self, EmbreeError> {
+        Self::with_flags(device, RTCSceneFlags::NONE)
+    }
+
+    fn with_flags(device: &Device, flags: RTCSceneFlags) -> Result<Self, EmbreeError> {
         let scene = device.build(|| {
             // SAFETY: the device is alive; the result is checked.
             let scene = unsafe { embree4_sys::rtcNewScene(device.raw()) };
             NonNull::new(scene).inspect(|scene| {
                 // SAFETY: the scene was made just now and is only known here.
-                unsafe { embree4_sys::rtcSetSceneFlags(scene.as_ptr(), RTCSceneFlags::ROBUST) }
+                unsafe { embree4_sys::rtcSetSceneFlags(scene.as_ptr(), flags) }
             })
         })?;
         let scene = scene.ok_or_else(|| {

@@ -143,7 +143,7 @@ def caustics():
         "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0},
                        "KHR_materials_ior": {"ior": 1.5},
                        "KHR_materials_volume": {"thicknessFactor": 0.1}}})
-    light = s.material(lamp(400.0))
+    light = s.material(lamp(100.0))
     s.add("floor", grey, quad(b, (-3, 0, -3), (0, 0, 6), (6, 0, 0)))
     s.add("wall", grey, quad(b, (-3, 0, -1.6), (6, 0, 0), (0, 3.5, 0)))
     # The section of the ring is a rounded rectangle, closed.
@@ -151,7 +151,7 @@ def caustics():
                for t in (2 * math.pi * k / 32 for k in range(33))]
     s.add("ring", gold, revolved(b, section, 192), translation=[-0.55, 0.001, 0.1])
     s.add("goblet", glass, revolved(b, goblet(), 128), translation=[0.65, 0.002, 0.0])
-    s.add("lamp", light, quad(b, (1.4, 3.0, 0.8), (0.2, 0, 0), (0, 0, 0.2)))
+    s.add("lamp", light, quad(b, (1.3, 3.0, 0.7), (0.4, 0, 0), (0, 0, 0.4)))
     return s.buffer, s.document(looking((0.0, 1.7, 3.0), (0.05, 0.25, 0.0), 34))
 
 

@@ -17,7 +17,7 @@ use dualight::report::accuracy::{
 fn measured() -> &'static (Study, Analysis) {
     static STUDY: OnceLock<(Study, Analysis)> = OnceLock::new();
     STUDY.get_or_init(|| {
-        let registry = Registry::builtin();
+        let registry = accuracy::with_measured_backends(Registry::builtin()).unwrap();
         let scene = import::load(
             Path::new("scenes/box.gltf"),
             &ImportOptions::default(),
@@ -131,6 +131,11 @@ fn tables_hold_every_point() {
     );
     assert_eq!(json["curves"][0]["method"], "path");
     assert!(accuracy::text(analysis).contains("noise floor"));
+    let markdown = accuracy::markdown(analysis);
+    let levels: usize = analysis.curves.iter().map(|c| c.times.len()).sum();
+    let rows = markdown.lines().filter(|l| l.starts_with('|')).count();
+    // Two tables with two lines of head each.
+    assert_eq!(rows, 4 + levels + accuracy::CHANGES.len());
 }
 
 /// What a browser is asked to look at once the page is loaded.

@@ -20,6 +20,8 @@ mod embree;
 mod linear;
 
 pub use crosscheck::{Class, CrossCheck, Finding};
+#[cfg(feature = "embree")]
+pub use embree::FAST as EMBREE_FAST;
 
 use std::sync::Arc;
 

@@ -27,6 +27,7 @@ const FORMATS: &[(&str, Writer)] = &[
         let title = format!("Accuracy against time: {}", r.circumstances.scene);
         Ok(accuracy::overview(r.analysis, r.study.clock, &title).svg())
     }),
+    ("md", |r| Ok(accuracy::markdown(r.analysis))),
     ("csv", |r| Ok(accuracy::csv(r.analysis))),
     ("json", |r| {
         let value = accuracy::json(r.study, r.analysis, r.circumstances);
@@ -45,7 +46,7 @@ struct Report<'a> {
 
 /// Measures error against time.
 pub(super) fn run(args: &AccuracyArgs) -> Result<Ending> {
-    let registry = Registry::builtin();
+    let registry = accuracy::with_measured_backends(Registry::builtin())?;
     let chosen = choose(&args.methods, &registry)?;
     let writers = writers(args)?;
     let control = Arc::new(Control::new(progress::reporter(args.quiet), None));
@@ -129,7 +130,7 @@ fn writers(args: &AccuracyArgs) -> Result<Vec<Writer>> {
             output::check_writable(path)?;
             found.map(|f| f.1).ok_or_else(|| {
                 Error::Usage(format!(
-                    "{}: the extension chooses the format and must be one of .html, .svg, .csv, .json",
+                    "{}: the extension chooses the format and must be one of .html, .svg, .md, .csv, .json",
                     path.display()
                 ))
             })

@@ -16,8 +16,8 @@ pub struct AccuracyArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as the help of the command")]
     pub scene: SceneArgs,
-    /// Report to write: .html the whole page, .svg the first plot, .csv and .json the numbers. May
-    /// be given several times [default: only the table below]
+    /// Report to write: .html the whole page, .svg the first plot, .md its tables, .csv and .json the
+    /// numbers. May be given several times [default: only the table below]
     #[arg(short, long = "output", value_name = "FILE")]
     pub outputs: Vec<PathBuf>,
     /// Methods, the first being what the others are compared with [default: all there are]

@@ -154,8 +154,9 @@ pub(super) fn plan(
         .zip(&ladders)
         .find(|(m, _)| m.photons(renderer.registry));
     if let (true, Some((m, first))) = (changes, photons) {
-        // A change costs up to four times as much, most of them about the same.
-        let rung = rung_within(*first, share / (2 * CHANGES.len()) as f64).unwrap_or(0);
+        // They have one and a half shares, and on average cost one and a half times as much as
+        // what they are made to.
+        let rung = rung_within(*first, share / (CHANGES.len() + 1) as f64).unwrap_or(0);
         let settings = m.settings(base, rung);
         let expected = first * STEP.powi(rung as i32);
         let kinds = (0..CHANGES.len()).map(Kind::Change);

@@ -205,6 +205,17 @@ pub const CHANGES: &[Change] = &[
         doc: "half the noise of all that is sampled at pixels",
         apply: |s| s.spp *= 4,
     },
+    #[cfg(feature = "embree")]
+    Change {
+        name: "not robust",
+        doc: "Embree without its robust mode: rays slip between triangles that share an edge",
+        apply: |s| s.accelerator = Some(crate::accel::EMBREE_FAST.name.into()),
+    },
+    Change {
+        name: "hits refined twice",
+        doc: "what computing each hit in double precision costs, paid once more for nothing",
+        apply: |s| s.accelerator = Some(super::precision::REFINED_TWICE.into()),
+    },
     Change {
         name: "rays by bvh",
         doc: "the hierarchy in Rust: no ray slips between triangles",
@@ -218,7 +229,7 @@ mod tests {
 
     #[test]
     fn every_method_and_change_names_plugins_there_are_and_rungs_grow() {
-        let registry = Registry::builtin();
+        let registry = super::super::with_measured_backends(Registry::builtin()).unwrap();
         let base = RenderSettings::default();
         let all = methods(&registry);
         assert_eq!(all[0].name, "path");

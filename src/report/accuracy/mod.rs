@@ -12,6 +12,7 @@ mod measure;
 mod methods;
 mod page;
 mod plots;
+mod precision;
 mod reference;
 mod tables;
 
@@ -21,8 +22,9 @@ pub use measure::{Kind, Run, Setting};
 pub use methods::{CHANGES, Change, Method, methods};
 pub use page::page;
 pub use plots::overview;
+pub use precision::with_measured_backends;
 pub use reference::Reference;
-pub use tables::{csv, json, text};
+pub use tables::{csv, json, markdown, text};
 
 use std::path::PathBuf;
 

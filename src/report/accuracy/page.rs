@@ -6,7 +6,7 @@ use std::io::Cursor;
 use base64::Engine;
 
 use super::analysis::describe;
-use super::tables::{interval, ratio, seconds, short};
+use super::tables::{changes, interval, ratio, seconds, short};
 use super::{Analysis, Circumstances, Point, Study, layers, plots};
 use crate::error::Result;
 use crate::film::{Channel, Image, Layer};
@@ -164,14 +164,8 @@ fn effects(analysis: &Analysis) -> String {
     );
     out += &head(&["change", "time", "error", "time × error", ""]);
     for e in &analysis.effects {
-        let cell = |i, differs: bool| if differs { interval(i) } else { "none".into() };
-        let cells = [
-            e.change.into(),
-            cell(&e.time, e.differs[0]),
-            cell(&e.error, e.differs[1]),
-            cell(&e.cost, e.differs[2]),
-            e.doc.into(),
-        ];
+        let [time, error, cost] = changes(e);
+        let cells = [e.change.into(), time, error, cost, e.doc.into()];
         out += &row(cells, "td");
     }
     out + "</table>\n"

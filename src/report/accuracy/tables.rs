@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-use super::{Analysis, Circumstances, Level, Study};
+use super::{Analysis, Circumstances, Effect, Level, Study};
 use crate::report::statistics::Interval;
 
 /// Three digits and the interval: `0.0123 [0.011, 0.014]`.
@@ -78,6 +78,59 @@ pub fn text(analysis: &Analysis) -> String {
         "noise floor: {t:.1} % of time, {e:.1} % of error, {both:.1} % of their product"
     );
     out
+}
+
+/// The tables of times and of changes as Markdown.
+pub fn markdown(analysis: &Analysis) -> String {
+    let first = analysis.curves.first().map_or("", |c| c.method.as_str());
+    let mut out = line([
+        "relMSE",
+        "method",
+        "seconds",
+        &format!("faster than {first}"),
+    ]);
+    out += &line(["---"; 4]);
+    let levels = analysis.curves.first().map_or(0, |c| c.times.len());
+    // By error, so that methods stand beside each other.
+    for k in 0..levels {
+        for c in &analysis.curves {
+            let l = &c.times[k];
+            out += &line([&short(l.error), &c.method, &seconds(l), &ratio(l)]);
+        }
+    }
+    let [t, e, both] = analysis.floor.map(|f| 100.0 * (f - 1.0));
+    out += &format!(
+        "\nNoise floor: {t:.0} % of time, {e:.0} % of error, {both:.0} % of their product.\n"
+    );
+    let Some(base) = analysis
+        .base
+        .as_ref()
+        .filter(|_| !analysis.effects.is_empty())
+    else {
+        return out;
+    };
+    out += &format!("\nChanged one at a time, from {base}:\n\n");
+    out += &line(["change", "time", "error", "time × error", "what it is"]);
+    out += &line(["---"; 5]);
+    for e in &analysis.effects {
+        let [time, error, cost] = changes(e);
+        out += &line([e.change, &time, &error, &cost, e.doc]);
+    }
+    out
+}
+
+fn line<const N: usize>(cells: [&str; N]) -> String {
+    format!("| {} |\n", cells.join(" | "))
+}
+
+/// The factors of a change in words: of time, of error, of both.
+pub(super) fn changes(e: &Effect) -> [String; 3] {
+    let cell = |i, differs: bool| if differs { interval(i) } else { "none".into() };
+    [
+        cell(&e.time, e.differs[0]),
+        cell(&e.error, e.differs[1]),
+        cell(&e.cost, e.differs[2]),
+    ]
 }
 
 /// One line per point and layer.
