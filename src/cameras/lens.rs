@@ -41,6 +41,10 @@ impl Camera for ThinLens {
         (from, (target - from).normalize())
     }
 
+    fn project(&self, p: DVec3) -> Option<([f64; 2], DVec3)> {
+        self.inner.project(p)
+    }
+
     fn has_lens(&self) -> bool {
         true
     }

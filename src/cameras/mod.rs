@@ -35,6 +35,10 @@ pub trait Camera: Send + Sync {
     /// `y` downward. World space. `lens` chooses a point of the lens, for cameras that have one.
     fn ray(&self, x: f64, y: f64, lens: [f64; 2]) -> (DVec3, DVec3);
 
+    /// The image point at which `p` is seen, and from where; `None` if `p` is not before the camera.
+    /// Of cameras with a lens, through its middle.
+    fn project(&self, p: DVec3) -> Option<([f64; 2], DVec3)>;
+
     /// Whether `lens` makes a difference to [`ray`](Self::ray).
     fn has_lens(&self) -> bool {
         false
@@ -56,3 +60,46 @@ crate::registry::impl_entry!(CameraEntry, "camera");
 
 /// The camera kinds.
 pub static CAMERAS: &[CameraEntry] = &[perspective::ENTRY, orthographic::ENTRY];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::BoundingSphere;
+    use crate::sampling::Rng;
+
+    #[test]
+    fn a_point_is_seen_where_its_ray_leaves_the_image() {
+        let around = BoundingSphere {
+            center: DVec3::new(1.0, 2.0, 3.0),
+            radius: 2.0,
+        };
+        let mut rng = Rng::new(3);
+        for entry in CAMERAS {
+            for lens in [false, true] {
+                let desc = CameraDesc {
+                    shift: [0.1, -0.2],
+                    lens: lens.then_some(Lens {
+                        radius: 0.1,
+                        focus: 2.5,
+                        blades: 0,
+                        rotation: 0.0,
+                        ratio: 1.0,
+                    }),
+                    ..framing(&around, 1.5)
+                };
+                let camera = (entry.build)(&desc, 1.5).expect("builds");
+                let camera = with_lens(camera, &desc).expect("a lens");
+                for _ in 0..100 {
+                    let at = rng.next_2d();
+                    let (o, d) = camera.ray(at[0], at[1], [0.5; 2]);
+                    let (back, from) = camera.project(o + 2.5 * d).expect("before the camera");
+                    for (a, b) in at.into_iter().zip(back) {
+                        assert!((a - b).abs() < 1e-9, "{}: {at:?} {back:?}", entry.name);
+                    }
+                    assert!((from - o).length() < 1e-9);
+                    assert!(camera.project(o - 2.5 * d).is_none());
+                }
+            }
+        }
+    }
+}

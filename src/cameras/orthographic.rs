@@ -19,6 +19,18 @@ impl Camera for Orthographic {
         let o = self.origin + self.right * (2.0 * x - 1.0 + sx) + self.up * (1.0 - 2.0 * y + sy);
         (o, self.forward)
     }
+
+    fn project(&self, p: DVec3) -> Option<([f64; 2], DVec3)> {
+        let d = p - self.origin;
+        let depth = d.dot(self.forward);
+        let [sx, sy] = self.shift;
+        let along = |axis: DVec3| d.dot(axis) / axis.length_squared();
+        let at = [
+            0.5 * (along(self.right) + 1.0 - sx),
+            0.5 * (1.0 + sy - along(self.up)),
+        ];
+        (depth > 0.0).then(|| (at, p - self.forward * depth))
+    }
 }
 
 fn build(d: &CameraDesc, aspect: f64) -> Result<Box<dyn Camera>, String> {

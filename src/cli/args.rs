@@ -7,6 +7,7 @@ use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::measure_args::{AccuracyArgs, BenchArgs};
+use super::photon_args::PhotonsArgs;
 use super::quality::Quality;
 use super::values::{self, Crop, Size};
 use crate::report::ErrorMap;
@@ -54,6 +55,8 @@ pub enum Command {
     Accuracy(AccuracyArgs),
     /// Measure how fast every stage is, ray tracing backends side by side
     Bench(BenchArgs),
+    /// Draw the stored photons as the camera sees them
+    Photons(PhotonsArgs),
 }
 
 /// What the numbers of a file's lights mean.

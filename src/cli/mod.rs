@@ -12,6 +12,8 @@ mod inspect;
 mod keep;
 mod machine;
 pub mod measure_args;
+pub mod photon_args;
+mod photons;
 pub mod plan;
 mod plugins;
 pub mod progress;
@@ -66,5 +68,6 @@ pub fn run(cli: &Cli) -> Result<Ending> {
         Command::Compare(args) => compare::run(args),
         Command::Accuracy(args) => accuracy::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Photons(args) => photons::run(args),
     }
 }

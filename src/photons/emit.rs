@@ -63,6 +63,12 @@ pub trait PhotonSource: Sync {
     fn cells(&self) -> u64 {
         0
     }
+
+    /// How often the cell that photon `i` leaves from was divided; `None` if there are no cells.
+    fn level(&self, i: u64) -> Option<u32> {
+        let _ = i;
+        None
+    }
 }
 
 /// An emission that can be chosen.

@@ -31,6 +31,7 @@ use map::{Pilot, Surroundings};
 pub use photon::{Photon, PhotonClass};
 pub use progress::{PhotonPass, SAMPLES as SAMPLES_PER_PASS};
 pub use targets::Targets;
+pub use trace::{StoredPhotons, follow_photons};
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -122,10 +123,7 @@ pub fn trace_photons(
                 Purpose::Caustic => settings.caustic,
             },
         });
-        let mut pass = trace::run(scene, accel, &*source, purpose, settings, control);
-        pass.counts.checked = source.checks();
-        pass.counts.cells = source.cells();
-        maps.rays.check += source.checks();
+        let pass = follow_photons(scene, accel, &*source, purpose, settings, control);
         maps.rays.add(&pass.rays);
         maps.tracing += start.elapsed().as_secs_f64();
         pass

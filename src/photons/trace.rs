@@ -21,12 +21,16 @@ const BATCH: u64 = 8192;
 const DEPTH_GUARD: u32 = 4096;
 
 /// Photons of one purpose, in the order of emission.
-pub(super) struct Pass {
-    pub(super) photons: Vec<Photon>,
+#[derive(Debug)]
+pub struct StoredPhotons {
+    /// Those of the map.
+    pub photons: Vec<Photon>,
     /// Caustic photons one diffuse surface further: `L S⁺ D S* D`.
-    pub(super) glow: Vec<Photon>,
-    pub(super) counts: PhotonCounts,
-    pub(super) rays: RayCounts,
+    pub glow: Vec<Photon>,
+    /// What became of them.
+    pub counts: PhotonCounts,
+    /// Rays traced.
+    pub rays: RayCounts,
 }
 
 /// One task's share.
@@ -39,14 +43,14 @@ struct Batch {
 }
 
 /// Emits and follows all photons of a source.
-pub(super) fn run(
+pub fn follow_photons(
     scene: &Scene,
     accel: &dyn Accelerator,
     source: &dyn PhotonSource,
     purpose: Purpose,
     settings: &PhotonSettings,
     control: &Control,
-) -> Pass {
+) -> StoredPhotons {
     let n = source.len();
     let name = match purpose {
         Purpose::Global => "global photons",
@@ -86,8 +90,13 @@ pub(super) fn run(
         rays.photon += b.segments;
         photons.extend_from_slice(&b.photons);
     }
-    let counts = ledger.counts(photons.len() as u64);
-    Pass {
+    rays.check = source.checks();
+    let counts = PhotonCounts {
+        checked: source.checks(),
+        cells: source.cells(),
+        ..ledger.counts(photons.len() as u64)
+    };
+    StoredPhotons {
         photons,
         glow,
         counts,

@@ -7,6 +7,7 @@ pub mod diff;
 mod error_image;
 #[cfg(feature = "flip")]
 mod flip;
+pub mod photon_view;
 pub mod rays;
 pub mod statistics;
 pub mod svg;

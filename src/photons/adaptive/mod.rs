@@ -64,7 +64,7 @@ impl PhotonSource for Adaptive<'_> {
     }
 
     fn emit(&self, i: u64) -> Option<EmittedPhoton> {
-        let k = self.first.partition_point(|&f| f <= i) - 1;
+        let k = self.share(i);
         let (share, count) = (&self.shares[k], self.first[k + 1] - self.first[k]);
         let tree = &self.trees[share.tree as usize];
         let place = hash2(u64::from(tree.index), tree.stratum.key());
@@ -84,6 +84,10 @@ impl PhotonSource for Adaptive<'_> {
 
     fn cells(&self) -> u64 {
         self.shares.len() as u64
+    }
+
+    fn level(&self, i: u64) -> Option<u32> {
+        Some(self.shares[self.share(i)].cell.level)
     }
 }
 
@@ -165,6 +169,11 @@ pub(super) fn emission<'a>(cx: &EmissionContext<'a>, order: Order) -> Box<dyn Ph
 }
 
 impl Adaptive<'_> {
+    /// The share that photon `i` belongs to.
+    fn share(&self, i: u64) -> usize {
+        self.first.partition_point(|&f| f <= i) - 1
+    }
+
     /// Gives each cell its photons.
     fn allot(&mut self, grown: &[plan::Grown], count: u64, purpose: Purpose) {
         // What every ray of the probes missed may still be there, faintly.
