@@ -56,7 +56,12 @@ fn the_squared_error_falls_at_least_with_the_power_two_thirds_of_the_samples() {
     let seeds = 4u64;
     let ladder = [16u32, 64, 256];
     let errors = ladder.map(|spp| {
-        let mean = |seed| error(&render(&scene, &registry, "photon", spp, 10 + seed), &references);
+        let mean = |seed| {
+            error(
+                &render(&scene, &registry, "photon", spp, 10 + seed),
+                &references,
+            )
+        };
         (0..seeds).map(mean).sum::<f64>() / seeds as f64
     });
     eprintln!("{ladder:?} samples: relative squared errors {errors:?}");

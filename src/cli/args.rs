@@ -194,10 +194,10 @@ pub struct RenderArgs {
     #[arg(help_heading = "Light transport")]
     pub shadow_rays: Option<u32>,
 
-    /// Photons sent into the scene; 10k and 2M are understood
+    /// Photons sent into the scene; 10k and 2M are understood [default: 4 for each pixel]
     #[arg(long, value_name = "N", value_parser = values::photons, help_heading = "Photons")]
     pub photons: Option<u64>,
-    /// Photons sent toward mirrors and glass
+    /// Photons sent toward mirrors and glass [default: 4 for each pixel]
     #[arg(long, value_name = "N", value_parser = values::photons, help_heading = "Photons")]
     pub caustic_photons: Option<u64>,
     /// Photons in a density estimate: more are smoother, fewer sharper

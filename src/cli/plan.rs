@@ -57,8 +57,9 @@ pub struct Plan {
     /// Whether to print nothing but errors.
     pub quiet: bool,
     size: Option<Size>,
-    /// Width and height are not settled before the camera is known.
+    /// What depends on the image's size is not settled before the camera is known.
     settings: RenderSettings,
+    args: RenderArgs,
 }
 
 impl Plan {
@@ -77,7 +78,6 @@ impl Plan {
         for path in &args.outputs {
             output::format_of(&registry.outputs, path)?;
         }
-        let defaults = args.quality.settings();
         let plan = Self {
             scene: args.scene.file.clone(),
             import: import_options(&args.scene),
@@ -109,18 +109,9 @@ impl Plan {
                 crop: args.crop.map(|c| c.0),
                 camera: args.camera.clone(),
                 threads: args.threads.map(|n| n as usize),
-                integrator_settings: IntegratorSettings {
-                    seed: args.seed,
-                    max_depth: args.max_depth,
-                    roulette: !args.no_roulette,
-                    photons: args.photons.unwrap_or(defaults.photons),
-                    caustic_photons: args.caustic_photons.unwrap_or(defaults.caustic_photons),
-                    nearest: args.nearest.map_or(defaults.nearest, |n| n as usize),
-                    gather_rays: args.gather.unwrap_or(defaults.gather_rays),
-                    background: args.background,
-                    shadow_rays: args.shadow_rays.unwrap_or(defaults.shadow_rays),
-                },
+                integrator_settings: IntegratorSettings::default(),
             },
+            args: args.clone(),
         };
         if let Some(size) = plan.size {
             plan.check_crop(size)?;
@@ -144,6 +135,7 @@ impl Plan {
         Ok(RenderSettings {
             width: size.width,
             height: size.height,
+            integrator_settings: integrator_settings(&self.args, size),
             ..self.settings.clone()
         })
     }
@@ -158,6 +150,24 @@ impl Plan {
             }
             _ => Ok(()),
         }
+    }
+}
+
+/// What was asked for, and for the rest what suits an image of that size.
+fn integrator_settings(args: &RenderArgs, size: Size) -> IntegratorSettings {
+    let defaults = args
+        .quality
+        .settings(u64::from(size.width) * u64::from(size.height));
+    IntegratorSettings {
+        seed: args.seed,
+        max_depth: args.max_depth,
+        roulette: !args.no_roulette,
+        photons: args.photons.unwrap_or(defaults.photons),
+        caustic_photons: args.caustic_photons.unwrap_or(defaults.caustic_photons),
+        nearest: args.nearest.map_or(defaults.nearest, |n| n as usize),
+        gather_rays: args.gather.unwrap_or(defaults.gather_rays),
+        background: args.background,
+        shadow_rays: args.shadow_rays.unwrap_or(defaults.shadow_rays),
     }
 }
 
@@ -230,6 +240,11 @@ mod tests {
     use super::*;
     use crate::cli::args::{self, Command};
 
+    const SQUARE: Size = Size {
+        width: 512,
+        height: 512,
+    };
+
     fn plan(options: &str) -> Result<Plan> {
         let line = format!("dualight render s.glb -o a.exr {options}");
         match args::parse(line.split_whitespace()).unwrap().command {
@@ -251,12 +266,14 @@ mod tests {
             ..RenderSettings::default()
         };
         assert_eq!(p.settings, expected);
+        let defaults = IntegratorSettings::default();
+        assert_eq!(integrator_settings(&p.args, SQUARE), defaults);
     }
 
     #[test]
     fn options_arrive_where_they_belong() {
         let p = plan("--quality draft --photons 7k").unwrap();
-        let i = &p.settings.integrator_settings;
+        let i = integrator_settings(&p.args, SQUARE);
         assert_eq!(
             (p.settings.spp, i.photons, i.caustic_photons),
             (4, 7000, 250_000)
@@ -266,7 +283,7 @@ mod tests {
              --no-roulette --max-depth 4 --seed 9 --threads 2 --effects all,-caustics",
         )
         .unwrap();
-        let i = &p.settings.integrator_settings;
+        let i = integrator_settings(&p.args, SQUARE);
         assert_eq!(
             (i.gather_rays, i.photons, i.caustic_photons),
             (0, 2_000_000, 10_000)
