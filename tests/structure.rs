@@ -54,24 +54,24 @@ const LAYERS: &[Layer] = &[
         uses: &["L0", "L1", "L2 textures"],
     },
     Layer {
-        name: "L3",
-        rooms: &["scene"],
-        uses: &["L0", "L1", "L2 textures", "L2"],
-    },
-    Layer {
-        name: "L4 import",
-        rooms: &["import"],
-        uses: &["L0", "L1", "L2 textures", "L2", "L3"],
-    },
-    Layer {
         name: "ffi",
         rooms: &["ffi"],
         uses: &[],
     },
     Layer {
-        name: "L4 accel",
+        name: "L2 accel",
         rooms: &["accel"],
         uses: &["L0", "L1", "ffi"],
+    },
+    Layer {
+        name: "L3",
+        rooms: &["scene"],
+        uses: &["L0", "L1", "L2 textures", "L2", "L2 accel"],
+    },
+    Layer {
+        name: "L4 import",
+        rooms: &["import"],
+        uses: &["L0", "L1", "L2 textures", "L2", "L3"],
     },
     Layer {
         name: "L5 effects",
@@ -81,7 +81,7 @@ const LAYERS: &[Layer] = &[
     Layer {
         name: "L5 photons",
         rooms: &["photons"],
-        uses: &["L0", "L1", "L2", "L3", "L4 accel", "L5 effects"],
+        uses: &["L0", "L1", "L2", "L3", "L2 accel", "L5 effects"],
     },
     Layer {
         name: "L5 integrators",
@@ -92,7 +92,7 @@ const LAYERS: &[Layer] = &[
             "L1",
             "L2",
             "L3",
-            "L4 accel",
+            "L2 accel",
             "L5 effects",
             "L5 photons",
         ],
@@ -109,7 +109,7 @@ const LAYERS: &[Layer] = &[
             "L2",
             "L3",
             "L4 import",
-            "L4 accel",
+            "L2 accel",
             "L5 effects",
             "L5 photons",
             "L5 integrators",

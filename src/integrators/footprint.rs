@@ -5,7 +5,7 @@ use crate::cameras::Camera;
 use crate::geometry::{Differential, Footprint, Landing, Ray, SurfacePoint};
 use crate::materials::BsdfSample;
 use crate::math::DVec3;
-use crate::scene::Scene;
+use crate::scene::{Crossing, Inside, Scene};
 
 /// Least distance between samples that is told apart, in pixels: what is finer is beyond what
 /// a filter of textures resolves.
@@ -61,35 +61,73 @@ impl Spacing {
     }
 }
 
-/// Where a ray landed, with or without derivatives.
+/// A path at the start of a segment.
 #[derive(Clone, Copy)]
-pub(super) struct Trail(Option<Landing>);
+pub(super) struct Start {
+    pub(super) ray: Ray,
+    pub(super) differential: Option<Differential>,
+    /// The bodies that it starts in.
+    pub(super) inside: Inside,
+}
+
+/// Where a ray landed: with or without derivatives, and between which media.
+#[derive(Clone, Copy)]
+pub(super) struct Trail {
+    landing: Option<Landing>,
+    crossing: Crossing,
+}
 
 impl Trail {
-    /// Carries the differential of `ray` to `sp`, if there is one.
+    /// Carries the differential of `ray` to `sp`, if there is one; it came through `inside`.
     #[inline]
     pub(super) fn land(
         differential: &Option<Differential>,
+        inside: Inside,
         scene: &Scene,
         ray: &Ray,
         sp: &SurfacePoint,
     ) -> Self {
-        match differential {
-            None => Self(None),
-            Some(d) => Self(d.land(&scene.geometry, ray, sp)),
+        Self {
+            landing: match differential {
+                None => None,
+                Some(d) => d.land(&scene.geometry, ray, sp),
+            },
+            crossing: scene.crossing(inside, sp),
         }
+    }
+
+    /// The media that the surface parts.
+    #[inline]
+    pub(super) fn crossing(&self) -> &Crossing {
+        &self.crossing
+    }
+
+    /// The path that goes on by a sample of the scattering function.
+    #[inline]
+    pub(super) fn start(&self, sp: &SurfacePoint, s: &BsdfSample) -> Start {
+        Start {
+            ray: sp.spawn(s.wi),
+            differential: self.leave(sp, s),
+            inside: self.beyond(s),
+        }
+    }
+
+    /// Where a ray starts that leaves by a sample of the scattering function.
+    #[inline]
+    pub(super) fn beyond(&self, s: &BsdfSample) -> Inside {
+        self.crossing.beyond(s.transmitted)
     }
 
     /// What textures average over.
     #[inline]
     pub(super) fn footprint(&self) -> Option<Footprint> {
-        self.0.map(|l| l.footprint())
+        self.landing.map(|l| l.footprint())
     }
 
     /// The differential of the ray that leaves by a sample of the scattering function.
     #[inline]
     pub(super) fn leave(&self, sp: &SurfacePoint, s: &BsdfSample) -> Option<Differential> {
-        self.0.map(|landing| {
+        self.landing.map(|landing| {
             if s.pdf > 0.0 {
                 landing.spread(sp, s.wi, s.pdf)
             } else {

@@ -3,11 +3,11 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use super::footprint::Trail;
+use super::Scratch;
+use super::footprint::{Start, Trail};
 use super::light_sampling::{View, power_heuristic, sample_direct};
 use super::photon::{CHAIN_GUARD, PhotonMapping, ROULETTE_DEPTH};
 use super::stored_light::{Stored, sites};
-use super::{CameraRay, Scratch};
 use crate::color::Rgb;
 use crate::effects::EffectSet;
 use crate::geometry::{Footprint, Ray, SurfacePoint};
@@ -129,10 +129,7 @@ impl PhotonMapping<'_> {
             let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
                 continue;
             };
-            let start = CameraRay {
-                ray: sp.spawn(s.wi),
-                differential: trail.leave(sp, &s),
-            };
+            let start = trail.start(sp, &s);
             scratch.rays.gather += 1;
             let shadow = f64::from(n_shadow);
             let mut seen = Rgb::ZERO;
@@ -165,7 +162,7 @@ impl PhotonMapping<'_> {
     /// are the diffuse surfaces that the path has gone on from.
     fn gather(
         &self,
-        start: CameraRay,
+        start: Start,
         mut beta: Rgb,
         sampler: &mut Sampler,
         scratch: &mut Scratch,
@@ -173,9 +170,10 @@ impl PhotonMapping<'_> {
         mut on_light: impl FnMut(Seen<'_>, Rgb),
     ) -> Rgb {
         let cx = &self.cx;
-        let CameraRay {
+        let Start {
             mut ray,
             mut differential,
+            mut inside,
         } = start;
         for depth in 0..CHAIN_GUARD {
             let Some(hit) = cx.accel.intersect(&ray) else {
@@ -188,15 +186,16 @@ impl PhotonMapping<'_> {
             if depth == 0 && !cx.scene.bodiless().is_empty() {
                 on_light(Seen::Between(&ray, sp.distance), beta);
             }
-            if let Some(t) = cx.scene.transmittance(&sp) {
+            let trail = Trail::land(&differential, inside, cx.scene, &ray, &sp);
+            if let Some(t) = cx.scene.transmittance(&sp, trail.crossing()) {
                 beta *= t;
             }
-            let trail = Trail::land(&differential, cx.scene, &ray, &sp);
             if depth == 0 && sp.light.is_some() {
                 on_light(Seen::Light(&sp, trail.footprint()), beta);
             }
             let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
             cx.scene.scatter(&sp, trail.footprint(), &mut bsdf);
+            trail.crossing().apply(&mut bsdf);
             let diffuse = bsdf.has_diffuse();
             if diffuse && !bsdf.has_specular() {
                 return beta * self.reflected(&sp, &trail, &bsdf, sampler, scratch, steps);
@@ -228,6 +227,7 @@ impl PhotonMapping<'_> {
             }
             ray = sp.spawn(s.wi);
             differential = trail.leave(&sp, &s);
+            inside = trail.beyond(&s);
             scratch.rays.gather += 1;
         }
         Rgb::ZERO
@@ -265,10 +265,7 @@ impl PhotonMapping<'_> {
         }
         let u = sampler.next_2d();
         if let Some(s) = bsdf.sample(sampler.next_1d(), u) {
-            let start = CameraRay {
-                ray: sp.spawn(s.wi),
-                differential: trail.leave(sp, &s),
-            };
+            let start = trail.start(sp, &s);
             scratch.rays.gather += 1;
             sum += self.gather(start, s.weight, sampler, scratch, steps + 1, |_, _| ());
         }

@@ -14,6 +14,7 @@ use crate::geometry::{Differential, Ray, SurfacePoint};
 use crate::materials::{Bsdf, BsdfValue, LobeClass, TransportMode};
 use crate::math::DVec3;
 use crate::sampling::Sampler;
+use crate::scene::{Inside, Scene};
 
 /// Scattering events after which roulette begins.
 const ROULETTE_DEPTH: u32 = 3;
@@ -75,6 +76,7 @@ struct Path<'a> {
 struct Walker {
     ray: Ray,
     differential: Option<Differential>,
+    inside: Inside,
     sampler: Sampler,
     beta: Rgb,
     walk: Walk,
@@ -85,10 +87,11 @@ struct Walker {
 }
 
 impl Walker {
-    fn new(sample: &Sample) -> Self {
+    fn new(scene: &Scene, sample: &Sample) -> Self {
         Self {
             ray: sample.camera.ray,
             differential: sample.camera.differential,
+            inside: scene.enclosing(sample.camera.ray.origin()),
             sampler: sample.sampler.clone(),
             beta: Rgb::ONE,
             walk: Walk::Camera,
@@ -121,7 +124,7 @@ impl Path<'_> {
     fn walk(&self, batch: &[Sample], sums: &mut [PixelSample], scratch: &mut Scratch) {
         let (accel, scene) = (self.cx.accel, self.cx.scene);
         let mut walkers: ArrayVec<Walker, BATCH> = ArrayVec::new();
-        walkers.extend(batch.iter().map(Walker::new));
+        walkers.extend(batch.iter().map(|s| Walker::new(scene, s)));
         let mut alive: ArrayVec<usize, BATCH> = (0..walkers.len()).collect();
         let mut points: ArrayVec<SurfacePoint, BATCH> = ArrayVec::new();
         let mut lights: ArrayVec<Direct, BATCH> = ArrayVec::new();
@@ -186,7 +189,8 @@ impl Path<'_> {
             let seen = View::of_path(depth, w.last).crossed(cx, &w.ray, sp.distance);
             out.add(w.walk.component(), w.beta * seen);
         }
-        if let Some(t) = cx.scene.transmittance(sp) {
+        let trail = Trail::land(&w.differential, w.inside, cx.scene, &w.ray, sp);
+        if let Some(t) = cx.scene.transmittance(sp, trail.crossing()) {
             w.beta *= t;
         }
         if depth == 0 {
@@ -195,7 +199,6 @@ impl Path<'_> {
             out.position += sp.p + cx.scene.center;
             out.depth += sp.distance;
         }
-        let trail = Trail::land(&w.differential, cx.scene, &w.ray, sp);
         if sp.light.is_some() {
             let le = cx.scene.emitted(sp, trail.footprint());
             if !le.is_black() {
@@ -207,6 +210,7 @@ impl Path<'_> {
         }
         let mut bsdf = Bsdf::new(sp, TransportMode::Radiance);
         cx.scene.scatter(sp, trail.footprint(), &mut bsdf);
+        trail.crossing().apply(&mut bsdf);
         if depth == 0 {
             out.albedo += bsdf.albedo();
         }
@@ -248,6 +252,7 @@ impl Path<'_> {
             return false;
         }
         w.ray = sp.spawn(s.wi);
+        w.inside = trail.beyond(&s);
         // Without textures there is none, and nothing is copied.
         match trail.leave(sp, &s) {
             None => w.differential = None,

@@ -23,6 +23,7 @@ use crate::geometry::{Differential, Ray};
 use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::math::DVec3;
 use crate::sampling::Sampler;
+use crate::scene::Inside;
 
 /// Longest chain of specular surfaces.
 pub(super) const CHAIN_GUARD: u32 = 256;
@@ -50,6 +51,7 @@ const MAX_CHAINS: usize = 3 * SPLIT_DEPTH as usize + 1;
 struct Chain {
     ray: Ray,
     differential: Option<Differential>,
+    inside: Inside,
     beta: Rgb,
     /// Scattering events so far.
     depth: u32,
@@ -65,6 +67,7 @@ impl Integrator for PhotonMapping<'_> {
             pending.push(Chain {
                 ray: sample.camera.ray,
                 differential: sample.camera.differential,
+                inside: self.cx.scene.enclosing(sample.camera.ray.origin()),
                 beta: Rgb::ONE,
                 depth: 0,
                 last: None,
@@ -100,6 +103,7 @@ impl PhotonMapping<'_> {
         let Chain {
             mut ray,
             mut differential,
+            mut inside,
             mut beta,
             depth: start,
             mut last,
@@ -118,12 +122,13 @@ impl PhotonMapping<'_> {
             };
             let sp = cx.scene.surface_point(&ray, &hit);
             out.add(component, beta * view.crossed(cx, &ray, sp.distance));
-            if let Some(t) = cx.scene.transmittance(&sp) {
+            let trail = Trail::land(&differential, inside, cx.scene, &ray, &sp);
+            if let Some(t) = cx.scene.transmittance(&sp, trail.crossing()) {
                 beta *= t;
             }
-            let trail = Trail::land(&differential, cx.scene, &ray, &sp);
             let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
             cx.scene.scatter(&sp, trail.footprint(), &mut bsdf);
+            trail.crossing().apply(&mut bsdf);
             if depth == 0 {
                 out.alpha += 1.0;
                 out.albedo += bsdf.albedo();
@@ -179,6 +184,7 @@ impl PhotonMapping<'_> {
                         let side = Chain {
                             ray: sp.spawn(b.wi),
                             differential: trail.leave(&sp, &b),
+                            inside: trail.beyond(&b),
                             beta: beta * b.weight,
                             depth: depth + 1,
                             last: None,
@@ -192,6 +198,7 @@ impl PhotonMapping<'_> {
                     last = None;
                     ray = sp.spawn(main.wi);
                     differential = trail.leave(&sp, &main);
+                    inside = trail.beyond(&main);
                     scratch.rays.bounce += 1;
                     continue;
                 }
@@ -223,6 +230,7 @@ impl PhotonMapping<'_> {
             }
             ray = sp.spawn(s.wi);
             differential = trail.leave(&sp, &s);
+            inside = trail.beyond(&s);
             scratch.rays.bounce += 1;
         }
     }

@@ -170,6 +170,25 @@ impl MaterialDesc {
         Alpha::new(self).map(|a| Arc::new(a) as Arc<dyn Coverage>)
     }
 
+    /// The enclosed medium, if light can get in.
+    ///
+    /// # Errors
+    /// A priority that is no number.
+    pub fn medium(&self) -> Result<Option<Medium>, String> {
+        let ours = self.extras.get("dualight");
+        let priority = match ours.and_then(|o| o.get("priority")) {
+            None => 0.0,
+            Some(value) => value
+                .as_f64()
+                .ok_or_else(|| format!("extras.dualight.priority {value} is no number"))?,
+        };
+        let open = self.volume && self.transmission > 0.0 && self.metallic < 1.0;
+        Ok(open.then_some(Medium {
+            ior: self.ior,
+            priority,
+        }))
+    }
+
     /// The enclosed medium, if it absorbs (Beer–Lambert).
     pub fn interior(&self) -> Option<Interior> {
         let absorbs = self.volume
@@ -182,6 +201,15 @@ impl MaterialDesc {
                 .map(|c| -c.clamp(1e-30, 1.0).ln() / self.attenuation_distance),
         })
     }
+}
+
+/// What a body holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// Index of refraction.
+    pub ior: f64,
+    /// Which body fills the space that several share: that of the highest priority.
+    pub priority: f64,
 }
 
 /// A homogeneous absorbing medium.

@@ -27,7 +27,7 @@ mod pbr;
 mod unlit;
 
 pub use bsdf::{Bsdf, BsdfSample, BsdfValue, FrameId, TransportMode};
-pub use desc::{AlphaMode, Interior, MaterialDesc, MaterialTraits};
+pub use desc::{AlphaMode, Interior, MaterialDesc, MaterialTraits, Medium};
 pub use lobes::{CustomLobe, Lobe, LobeClass, LobeModel, LobeSample};
 pub use slots::TextureSlots;
 pub use thin_film::ThinFilm;

@@ -123,6 +123,7 @@ impl Tracer<'_> {
         let mut ray = photon.ray;
         let mut power = photon.power;
         let mut class = PhotonClass::Direct;
+        let mut inside = self.scene.enclosing(ray.origin());
         out.ledger.emitted += power;
         for depth in 1.. {
             out.segments += 1;
@@ -136,13 +137,15 @@ impl Tracer<'_> {
                 out.ledger.absorbed += power - left;
                 power = left;
             }
-            if let Some(t) = self.scene.transmittance(&sp) {
+            let crossing = self.scene.crossing(inside, &sp);
+            if let Some(t) = self.scene.transmittance(&sp, &crossing) {
                 let left = power * t;
                 out.ledger.absorbed += power - left;
                 power = left;
             }
             let mut bsdf = Bsdf::new(&sp, TransportMode::Importance);
             self.scene.scatter(&sp, None, &mut bsdf);
+            crossing.apply(&mut bsdf);
             if bsdf.has_diffuse() {
                 let ng = if sp.front { sp.ng } else { -sp.ng };
                 let photon = Photon::new(sp.p, sp.wo, ng, power, class);
@@ -193,6 +196,7 @@ impl Tracer<'_> {
                 _ => PhotonClass::Caustic,
             };
             ray = sp.spawn(s.wi);
+            inside = crossing.beyond(s.transmitted);
         }
     }
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::bake;
 use super::emitters::{surface_light, vary};
-use super::{LightChoice, Scene};
+use super::{LightChoice, Media, Scene};
 use crate::cameras::CameraDesc;
 use crate::color::Rgb;
 use crate::error::{Error, Result};
@@ -19,7 +19,7 @@ use crate::geometry::{
     TriangleMesh,
 };
 use crate::lights::{LightDesc, LightEntry};
-use crate::materials::{Material, MaterialDesc, MaterialEntry};
+use crate::materials::{Material, MaterialDesc, MaterialEntry, Medium};
 use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3};
 use crate::registry::Table;
 use crate::textures::Texture;
@@ -76,6 +76,7 @@ pub struct SceneBuilder {
         String,
         Option<Emission>,
         Option<Arc<dyn Coverage>>,
+        Option<Medium>,
     )>,
     textures: Vec<Texture>,
     placements: Vec<MeshPlacement>,
@@ -158,8 +159,17 @@ impl SceneBuilder {
             texture: desc.textures.as_ref().and_then(|t| t.emissive.clone()),
             double_sided: desc.double_sided,
         });
-        self.materials
-            .push((material, desc.name.clone(), emission, desc.coverage()));
+        let medium = desc
+            .medium()
+            .map_err(|e| Error::Usage(format!("material '{}': {e}", desc.name)))?
+            .filter(|_| material.traits().transmits);
+        self.materials.push((
+            material,
+            desc.name.clone(),
+            emission,
+            desc.coverage(),
+            medium,
+        ));
         if let Some(slots) = &desc.textures {
             self.textures.extend(slots.iter().map(|(_, t)| t.clone()));
         }
@@ -200,6 +210,18 @@ impl SceneBuilder {
         for c in &mut cameras {
             c.world_from_camera.translation -= center;
         }
+        let (media, in_air) = Media::new(&geometry, |id| {
+            let m = &self.materials[geometry.object(id).material.index()];
+            m.4.map(|medium| (medium, m.0.interior()))
+        })?;
+        if let Some(first) = in_air.first() {
+            self.warnings.push(format!(
+                "{} transparent bodies touch others but count as lying in air, '{}' first: the \
+                 order of 64 is kept",
+                in_air.len(),
+                geometry.object(*first).name
+            ));
+        }
         let (mut materials, mut material_names) = (Vec::new(), Vec::new());
         for (m, name, ..) in self.materials {
             materials.push(m);
@@ -213,6 +235,7 @@ impl SceneBuilder {
             textures: self.textures,
             lights,
             light_names,
+            media,
             cameras,
             bounds,
             center,

@@ -5,11 +5,13 @@ mod builder;
 mod census;
 mod emitters;
 mod light_choice;
+mod media;
 mod precision;
 
 pub use builder::{Emission, MeshPlacement, SceneBuilder, ScenePlugins};
 pub use census::Census;
 pub use light_choice::LightChoice;
+pub use media::{Crossing, Inside, Media};
 
 use std::sync::Arc;
 
@@ -37,6 +39,8 @@ pub struct Scene {
     pub light_names: Vec<(String, &'static str)>,
     /// How lights are chosen for a shading point.
     pub choose_light: LightChoice,
+    /// Bodies that touch or lie in one another, if there are any.
+    pub media: Option<Media>,
     /// Cameras, in the order of the file.
     pub cameras: Vec<CameraDesc>,
     /// World-space box of the geometry, after recentring.
@@ -145,10 +149,33 @@ impl Scene {
         Some((LightId(i as u32), pdf, rest))
     }
 
-    /// Share of the light that survives the segment of `ray` that ended at `sp`, if it ran
+    /// The bodies that a point lies in, of those that may share space: where a path begins.
+    #[inline]
+    pub fn enclosing(&self, p: DVec3) -> Inside {
+        match &self.media {
+            None => Inside::default(),
+            Some(media) => media.enclosing(p),
+        }
+    }
+
+    /// What a path that came through `inside` crosses if it passes the surface at `sp`.
+    #[inline]
+    pub fn crossing(&self, inside: Inside, sp: &SurfacePoint) -> Crossing {
+        match &self.media {
+            None => Crossing::plain(inside),
+            Some(media) => media.crossing(inside, sp),
+        }
+    }
+
+    /// Share of the light that survives the segment of a ray that ended at `sp`, if it ran
     /// inside an absorbing body (Beer–Lambert).
     #[inline]
-    pub fn transmittance(&self, sp: &SurfacePoint) -> Option<Rgb> {
+    pub fn transmittance(&self, sp: &SurfacePoint, crossing: &Crossing) -> Option<Rgb> {
+        if let Some(media) = &self.media
+            && (media.knows(sp.object) || crossing.beyond(false) != Inside::default())
+        {
+            return media.transmittance(crossing, sp);
+        }
         if sp.front {
             return None;
         }

@@ -120,6 +120,14 @@ impl Bsdf {
         }
     }
 
+    /// Multiplies the relative index of what refracts: the surface parts other media than its
+    /// material and air. By 0, where there is no border between media, light passes straight.
+    pub fn immerse(&mut self, correction: f64) {
+        for e in &mut self.lobes {
+            e.lobe.immerse(correction);
+        }
+    }
+
     /// Lays a layer over all lobes pushed so far.
     pub(in crate::materials) fn cover(&mut self, cover: Cover, frame: FrameId) {
         let passes = cover.passes(self.view(frame).wo.z);

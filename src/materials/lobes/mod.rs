@@ -77,6 +77,34 @@ pub trait LobeModel {
     }
 }
 
+/// Relative indices closer to 1 than this bend nothing that roughness could spread.
+const NO_BORDER: f64 = 1e-4;
+
+impl Lobe {
+    /// Multiplies the relative index of a lobe that refracts; by 0, light passes straight.
+    pub(in crate::materials) fn immerse(&mut self, correction: f64) {
+        let (facet, rough) = match self {
+            Self::SmoothDielectric(facet) => (facet, false),
+            Self::GgxDielectric(lobe) => (&mut lobe.facet, true),
+            _ => return,
+        };
+        if correction == 0.0 {
+            *self = SmoothDielectric {
+                eta: 1.0,
+                tint: Rgb::ONE,
+                reflect: Rgb::ZERO,
+                share: facet.share,
+            }
+            .into();
+            return;
+        }
+        facet.eta *= correction;
+        if rough && (facet.eta - 1.0).abs() < NO_BORDER {
+            *self = (*facet).into();
+        }
+    }
+}
+
 /// One of several branches, in proportion to its weight.
 #[inline]
 fn pick(branches: Branches, u: f64) -> Option<LobeSample> {
