@@ -124,9 +124,9 @@ def dualight(program, scene, size, options, directory):
     return read_exr(out), seconds, stages
 
 
-def ladder(size):
+def ladder(size, most=256):
     """Options of photon mapping, as `dualight accuracy` has them."""
-    for spp in (1, 4, 16, 64, 256):
+    for spp in (n for n in (1, 4, 16, 64, 256) if n <= most):
         photons = max(size * size * min(spp, 16) // 4, 10_000)
         nearest = max(round(50 * (photons / 1e6) ** (2 / 3)), 8)
         yield spp, ["--spp", spp, "--photons", photons, "--caustic-photons", photons, "--nearest", nearest]
@@ -152,14 +152,14 @@ def compare(half_width, args, directory):
     theirs = mitsuba_scene(mi, half_width, radiance, args.size)
     render = lambda seed: np.array(mi.render(theirs, spp=args.spp, seed=seed), dtype=np.float64)
     render(1_000_000)
-    pictures, seconds, ours = [], [], {spp: [] for spp, _ in ladder(args.size)}
+    pictures, seconds, ours = [], [], {spp: [] for spp, _ in ladder(args.size, args.most_spp)}
     profile = {}
     for seed in range(args.seeds):
         for _ in range(args.mitsuba_pictures):
             start = time.perf_counter()
             pictures.append(render(len(pictures)))
             seconds.append(time.perf_counter() - start)
-        for spp, options in ladder(args.size):
+        for spp, options in ladder(args.size, args.most_spp):
             image, t, stages = dualight(args.program, scene, args.size, [*options, "--seed", seed], directory)
             ours[spp].append((image, t))
             profile[spp] = stages
@@ -208,6 +208,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--spp", type=int, default=256, help="samples of Mitsuba's pictures")
     parser.add_argument("--mitsuba-pictures", type=int, default=4, help="pictures by Mitsuba per seed")
+    parser.add_argument("--most-spp", type=int, default=256, help="samples of Dualight's longest pictures")
     parser.add_argument("--reference-spp", type=int, default=1024)
     parser.add_argument("--half-widths", type=float, nargs="+", default=[0.25, 0.05])
     parser.add_argument("-o", "--output", help="JSON file to write")
