@@ -101,6 +101,14 @@ impl Watertight {
         }
     }
 
+    /// What a version of [`intersect_single`](Self::intersect_single) for several triangles
+    /// needs: which coordinates take the place of `x`, `y`, `z`, the origin's along them, and the
+    /// shear.
+    #[inline]
+    pub fn parts(&self) -> ([usize; 3], DVec3, DVec3) {
+        (self.axes, self.permuted, self.shear)
+    }
+
     /// A point relative to the origin, its coordinates given along `axes`.
     #[inline]
     fn shear(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {

@@ -1,19 +1,20 @@
-//! Builds four-wide trees from the top, by the surface area heuristic over bins.
+//! Builds eight-wide trees from the top, by the surface area heuristic over bins.
 //!
 //! Source: Wald, *On fast Construction of SAH-based Bounding Volume Hierarchies*, 2007. Below a
 //! fixed depth, and wherever the bins cannot tell primitives apart, ranges are halved by number:
 //! time is `O(n log n)` and depth is bounded whatever the input.
 
-use glam::{Vec3A, Vec4};
+use glam::Vec3A;
 use rayon::prelude::*;
 
-use super::node::{MAX_LEAF, NOTHING, Node, leaf};
+use super::leaf::WIDTH as MAX_LEAF;
+use super::node::{MOST_PRIMS, NOTHING, Node, WIDTH, leaf};
 
 /// Levels that may follow the heuristic; halving 2²⁷ primitives takes another 26.
 const SAH_LEVELS: usize = 32;
 const BINS: usize = 16;
-/// Cost of a primitive's test, in units of a node's.
-const PRIM_COST: f32 = 1.5;
+/// Bits of a range that say where it starts.
+const OFFSET_BITS: u32 = MOST_PRIMS.trailing_zeros();
 /// Ranges above this are built in parallel.
 const PARALLEL: usize = 1 << 14;
 
@@ -60,11 +61,19 @@ fn bounds(refs: &[Ref]) -> Ref {
     })
 }
 
-/// A tree; leaves index the primitives in the order that [`build`] leaves the references in.
+/// A leaf while the tree grows: its first primitive and their number.
+fn range(first: usize, count: usize) -> u32 {
+    debug_assert!(first < MOST_PRIMS && count <= MAX_LEAF);
+    NOTHING | (count as u32) << OFFSET_BITS | first as u32
+}
+
+/// A tree; leaves hold ranges of the primitives in the order that [`build`] leaves the references in.
 #[derive(Debug)]
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
     pub(super) root: u32,
+    /// First primitive of each leaf and their number; leaf 0 is the one without any.
+    pub(super) leaves: Vec<(u32, u32)>,
     /// Lower corner of the whole; zero if there is nothing.
     pub(super) min: Vec3A,
     /// Upper corner of the whole.
@@ -91,15 +100,27 @@ pub(super) fn build(refs: &mut [Ref], parallel: bool) -> Tree {
         bounds(refs)
     };
     let mut nodes = Vec::with_capacity(refs.len() / 2);
-    let root = if refs.is_empty() {
+    let mut root = if refs.is_empty() {
         NOTHING
     } else {
         emit(&mut nodes, refs, 0, 0, parallel)
     };
     nodes.shrink_to_fit();
+    // In the order in which nodes lie, so that leaves lie near what leads to them.
+    let mut leaves = Vec::with_capacity(1 + nodes.len() * WIDTH * 3 / 4);
+    leaves.push((0, 0));
+    let children = nodes.iter_mut().flat_map(|n| &mut n.child);
+    for code in children.chain([&mut root]) {
+        let count = (*code & !NOTHING) >> OFFSET_BITS;
+        if *code & NOTHING != 0 && count > 0 {
+            leaves.push((*code & (MOST_PRIMS as u32 - 1), count));
+            *code = leaf(leaves.len() - 1);
+        }
+    }
     Tree {
         nodes,
         root,
+        leaves,
         min: all.min,
         max: all.max,
     }
@@ -120,14 +141,14 @@ fn emit(
     depth: usize,
     parallel: bool,
 ) -> u32 {
-    let mut ranges = arrayvec::ArrayVec::<Range, 4>::new();
+    let mut ranges = arrayvec::ArrayVec::<Range, WIDTH>::new();
     ranges.push(Range {
         start: 0,
         end: refs.len(),
         bounds: bounds(refs),
         whole: false,
     });
-    while ranges.len() < 4 {
+    while ranges.len() < WIDTH {
         // The largest first: by area, or by number where areas no longer count.
         let scale = 1.0 / longest(&ranges[0].bounds).max(f32::MIN_POSITIVE);
         let weight = |r: &Range| {
@@ -165,20 +186,21 @@ fn emit(
         }
     }
     if ranges.len() == 1 {
-        return leaf(first, refs.len());
+        return range(first, refs.len());
     }
     let mut node = Node::EMPTY;
     for (i, r) in ranges.iter().enumerate() {
         for k in 0..3 {
-            set(&mut node.planes[k][0], i, r.bounds.min[k]);
-            set(&mut node.planes[k][1], i, r.bounds.max[k]);
+            node.planes[k][0][i] = r.bounds.min[k];
+            node.planes[k][1][i] = r.bounds.max[k];
         }
     }
     let index = nodes.len();
     nodes.push(node);
-    let mut parts = Vec::with_capacity(4);
+    let mut parts = Vec::with_capacity(WIDTH);
     let mut rest = &mut refs[..];
-    let mut sorted: arrayvec::ArrayVec<(usize, &Range), 4> = ranges.iter().enumerate().collect();
+    let mut sorted: arrayvec::ArrayVec<(usize, &Range), WIDTH> =
+        ranges.iter().enumerate().collect();
     sorted.sort_by_key(|(_, r)| r.start);
     for (i, r) in sorted {
         let (part, tail) = rest.split_at_mut(r.end - r.start);
@@ -225,14 +247,10 @@ fn child(
     whole: bool,
 ) -> u32 {
     if whole || refs.len() == 1 {
-        leaf(first, refs.len())
+        range(first, refs.len())
     } else {
         emit(nodes, refs, first, depth + 1, parallel)
     }
-}
-
-fn set(v: &mut Vec4, lane: usize, value: f32) {
-    v[lane] = value;
 }
 
 fn longest(b: &Ref) -> f32 {
@@ -242,16 +260,15 @@ fn longest(b: &Ref) -> f32 {
 /// Where to split, after reordering; `None` if the range is best left whole.
 fn split(refs: &mut [Ref], total: &Ref, depth: usize) -> Option<usize> {
     let n = refs.len();
-    if n == 1 {
+    if n <= MAX_LEAF {
         return None;
     }
-    let halves = (n > MAX_LEAF).then_some(n / 2);
+    let halves = Some(n / 2);
     if depth >= SAH_LEVELS {
         return halves;
     }
     // In units of the longest edge, areas neither overflow nor vanish.
     let scale = 1.0 / longest(total);
-    let area = total.half_area(scale);
     let (mut lo, mut hi) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
     for r in refs.iter() {
         lo = lo.min(r.center());
@@ -289,16 +306,14 @@ fn split(refs: &mut [Ref], total: &Ref, depth: usize) -> Option<usize> {
             if count == 0 || right_count == 0 {
                 continue;
             }
-            let cost = b.half_area(scale) * count as f32 + right_area * right_count as f32;
+            let blocks = |n: u32| n.div_ceil(MAX_LEAF as u32) as f32;
+            let cost = b.half_area(scale) * blocks(count) + right_area * blocks(right_count);
             if cost < best.0 {
                 best = (cost, axis, i);
             }
         }
     }
     let (cost, axis, at) = best;
-    if n <= MAX_LEAF && !(area + cost * PRIM_COST < area * n as f32 * PRIM_COST) {
-        return None;
-    }
     if !cost.is_finite() {
         return halves;
     }
@@ -341,9 +356,8 @@ mod tests {
         let mut todo = vec![(tree.root, 1, Vec3A::NEG_INFINITY, Vec3A::INFINITY)];
         while let Some((code, depth, lo, hi)) = todo.pop() {
             if code & NOTHING != 0 {
-                let first = (code & ((1 << super::super::node::OFFSET_BITS) - 1)) as usize;
-                let count = ((code & !NOTHING) >> super::super::node::OFFSET_BITS) as usize;
-                for r in &refs[first..first + count] {
+                let (first, count) = tree.leaves[(code & !NOTHING) as usize];
+                for r in &refs[first as usize..(first + count) as usize] {
                     seen[r.index as usize] += 1;
                     assert!(r.min.cmpge(lo).all() && r.max.cmple(hi).all());
                 }
@@ -351,7 +365,7 @@ mod tests {
             }
             deepest = deepest.max(depth);
             let node = &tree.nodes[code as usize];
-            for i in 0..4 {
+            for i in 0..WIDTH {
                 let corner = |s: usize| Vec3A::from([0, 1, 2].map(|k| node.planes[k][s][i]));
                 if node.child[i] != NOTHING {
                     todo.push((node.child[i], depth + 1, corner(0), corner(1)));

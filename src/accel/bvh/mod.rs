@@ -11,19 +11,23 @@
 //! passes at a distance (seen edge-on to `2⁻⁵⁰`), a box may rightly rule it out.
 
 mod build;
+mod lanes;
+mod leaf;
 mod node;
+mod search;
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec3A;
+use rayon::prelude::*;
 
 use self::build::{Ref, Tree};
-use self::node::{OFFSET_BITS, Slab, traverse};
-use super::linear::{PreparedRay, PrimHit, uncut};
+use self::leaf::Block;
+use self::node::MOST_PRIMS;
 use super::{Accelerator, AcceleratorEntry, BuildStats};
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Hit, Object, ObjectId, Placement, Ray, Shape, ray_key, sphere};
+use crate::geometry::{Geometry, Hit, Object, ObjectId, Placement, Ray, Shape};
 use crate::math::{Aabb, DMat3, DVec3, Vec3, max_abs};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,12 +52,14 @@ struct Prim {
 #[derive(Debug)]
 struct Level {
     tree: Tree,
-    prims: Vec<Prim>,
+    blocks: Vec<Block>,
+    /// Primitives in all blocks.
+    count: usize,
 }
 
 impl Level {
     fn new(entries: Vec<(Prim, Bounds)>, parallel: bool) -> Result<Self> {
-        if entries.len() >= 1 << OFFSET_BITS {
+        if entries.len() >= MOST_PRIMS {
             return Err(Error::Accelerator {
                 backend: "bvh",
                 problem: format!("{} primitives are more than it can hold", entries.len()),
@@ -69,13 +75,27 @@ impl Level {
                 index: i as u32,
             })
             .collect();
-        let tree = build::build(&mut refs, parallel);
-        let prims = refs.iter().map(|r| entries[r.index as usize].0).collect();
-        Ok(Self { tree, prims })
+        let mut tree = build::build(&mut refs, parallel);
+        let block = |&(first, count): &(u32, u32)| {
+            let range = &refs[first as usize..(first + count) as usize];
+            Block::new(range.iter().map(|r| entries[r.index as usize].0))
+        };
+        let blocks = if parallel {
+            tree.leaves.par_iter().map(block).collect()
+        } else {
+            tree.leaves.iter().map(block).collect()
+        };
+        tree.leaves = Vec::new();
+        let count = refs.len();
+        Ok(Self {
+            tree,
+            blocks,
+            count,
+        })
     }
 
     fn bytes(&self) -> usize {
-        size_of_val(&self.tree.nodes[..]) + size_of_val(&self.prims[..])
+        size_of_val(&self.tree.nodes[..]) + size_of_val(&self.blocks[..])
     }
 }
 
@@ -169,166 +189,14 @@ struct Bvh {
     /// Largest coordinate, and largest term of an instance's map.
     reach: f64,
     stats: BuildStats,
-}
-
-/// The state of a search.
-struct Search {
-    tmin: f64,
-    tmax: f64,
-    /// The ray's key, if some hits are to be asked about.
-    key: Option<u64>,
-    best: Option<(PrimHit, u32, u32)>,
-}
-
-impl Search {
-    /// Takes a hit within the bounds, if it is better than the best; of equal ones the first.
-    #[inline]
-    fn offer(&mut self, h: PrimHit, object: u32, prim: u32) {
-        let better = match &self.best {
-            None => true,
-            Some((b, o, p)) => h.t < b.t || (h.t == b.t && (object, prim) < (*o, *p)),
-        };
-        if better {
-            self.tmax = h.t;
-            self.best = Some((h, object, prim));
-        }
-    }
-}
-
-#[inline(always)]
-fn test(prim: &Prim, ray: &PreparedRay, search: &Search, tmin: f64) -> Option<PrimHit> {
-    if prim.kind == Kind::Triangle {
-        ray.watertight
-            .intersect_single(&prim.data, tmin, search.tmax)
-            .map(|h| PrimHit {
-                t: h.t,
-                u: h.b1,
-                v: h.b2,
-            })
-    } else {
-        let c = Vec3::from(prim.data[0]).as_dvec3();
-        let r = f64::from(prim.data[1][0]);
-        sphere::intersect(ray.o, ray.d, c, r, tmin, search.tmax).map(|t| PrimHit {
-            t,
-            u: 0.0,
-            v: 0.0,
-        })
-    }
-}
-
-impl Bvh {
-    /// Tests a primitive of `object`, and asks about the hit where that is not whole.
-    #[inline(always)]
-    fn test(
-        &self,
-        prim: &Prim,
-        object: u32,
-        ray: &PreparedRay,
-        search: &Search,
-    ) -> Option<PrimHit> {
-        match search.key {
-            None => test(prim, ray, search, search.tmin),
-            Some(key) => self.test_uncut(prim, object, ray, search, key),
-        }
-    }
-
-    #[inline(never)]
-    fn test_uncut(
-        &self,
-        prim: &Prim,
-        object: u32,
-        ray: &PreparedRay,
-        search: &Search,
-        key: u64,
-    ) -> Option<PrimHit> {
-        let find = |tmin| test(prim, ray, search, tmin);
-        let at = &self.geometry.objects[object as usize];
-        match &at.coverage {
-            None => find(search.tmin),
-            Some(coverage) => {
-                let shape = self.geometry.shape(at.shape);
-                let which = (key, object, prim.prim);
-                uncut(&**coverage, shape, ray, which, search.tmin, find)
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn search<const ANY: bool>(&self, ray: &Ray) -> Option<(PrimHit, u32, u32)> {
-        if !ray.is_valid() {
-            return None;
-        }
-        let mut search = Search {
-            tmin: f64::from(ray.tmin),
-            tmax: f64::from(ray.tmax),
-            key: (!self.whole).then(|| ray_key(ray)),
-            best: None,
-        };
-        let world = PreparedRay::new(ray.origin(), ray.direction());
-        let level = &self.top;
-        let slab = Slab::new(world.o, world.d, search.tmin, self.reach, self.slop)?;
-        let bound = slab.bound(search.tmax);
-        traverse(
-            &level.tree.nodes,
-            level.tree.root,
-            &slab,
-            bound,
-            |first, count, bound| {
-                for prim in &level.prims[first..first + count] {
-                    if prim.kind == Kind::Instance {
-                        self.instance::<ANY>(prim, &world, &mut search);
-                    } else if let Some(h) = self.test(prim, prim.object, &world, &search) {
-                        search.offer(h, prim.object, prim.prim);
-                    }
-                    if ANY && search.best.is_some() {
-                        return false;
-                    }
-                }
-                *bound = slab.bound(search.tmax);
-                true
-            },
-        );
-        search.best
-    }
-
-    #[inline(never)]
-    fn instance<const ANY: bool>(&self, at: &Prim, world: &PreparedRay, search: &mut Search) {
-        let Some(place) = &self.geometry.objects[at.object as usize].placement else {
-            return;
-        };
-        let local = PreparedRay::new(
-            place.object_from_world.transform_point3(world.o),
-            place.object_from_world.transform_vector3(world.d),
-        );
-        let level = &self.shapes[at.prim as usize];
-        let Some(slab) = Slab::new(local.o, local.d, search.tmin, level.tree.reach(), 1.0) else {
-            return;
-        };
-        let bound = slab.bound(search.tmax);
-        traverse(
-            &level.tree.nodes,
-            level.tree.root,
-            &slab,
-            bound,
-            |first, count, bound| {
-                for prim in &level.prims[first..first + count] {
-                    if let Some(h) = self.test(prim, at.object, &local, search) {
-                        search.offer(h, at.object, prim.prim);
-                        if ANY {
-                            return false;
-                        }
-                    }
-                }
-                *bound = slab.bound(search.tmax);
-                true
-            },
-        );
-    }
+    /// The instructions for the inner loops, if there are better ones than all processors have.
+    #[cfg(target_arch = "x86_64")]
+    wide: Option<lanes::Wide>,
 }
 
 impl Accelerator for Bvh {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.search::<false>(ray).map(|(h, object, prim)| Hit {
+        self.best::<false>(ray).map(|(h, object, prim)| Hit {
             t: h.t as f32,
             u: h.u as f32,
             v: h.v as f32,
@@ -338,7 +206,7 @@ impl Accelerator for Bvh {
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        self.search::<true>(ray).is_some()
+        self.best::<true>(ray).is_some()
     }
 
     fn stats(&self) -> BuildStats {
@@ -368,7 +236,7 @@ fn build_with(geometry: &Arc<Geometry>, parallel: bool) -> Result<Bvh> {
     let mut shapes = Vec::new();
     let mut tree_of: Vec<Option<u32>> = vec![None; geometry.shapes.len()];
     let mut entries = Vec::new();
-    let (mut slop, mut reach) = (1f64, 0f64);
+    let (mut slop, mut reach, mut instances) = (1f64, 0f64, 0u64);
     for (
         i,
         Object {
@@ -388,7 +256,7 @@ fn build_with(geometry: &Arc<Geometry>, parallel: bool) -> Result<Bvh> {
                 *tree_of[shape.index()].insert(shapes.len() as u32 - 1)
             }
         };
-        if shapes[tree as usize].prims.is_empty() {
+        if shapes[tree as usize].count == 0 {
             continue;
         }
         slop = slop.max(amplification(place));
@@ -401,6 +269,7 @@ fn build_with(geometry: &Arc<Geometry>, parallel: bool) -> Result<Bvh> {
             prim: tree,
         };
         entries.push((prim, bounds));
+        instances += 1;
     }
     let top = Level::new(entries, parallel)?;
     reach = reach.max(top.tree.reach());
@@ -409,10 +278,7 @@ fn build_with(geometry: &Arc<Geometry>, parallel: bool) -> Result<Bvh> {
         backend: "bvh".into(),
         seconds: start.elapsed().as_secs_f64(),
         bytes: levels().map(|l| l.bytes() as u64).sum(),
-        primitives: levels()
-            .flat_map(|l| &l.prims)
-            .filter(|p| p.kind != Kind::Instance)
-            .count() as u64,
+        primitives: levels().map(|l| l.count as u64).sum::<u64>() - instances,
     };
     Ok(Bvh {
         whole: geometry.is_whole(),
@@ -422,6 +288,8 @@ fn build_with(geometry: &Arc<Geometry>, parallel: bool) -> Result<Bvh> {
         slop,
         reach,
         stats,
+        #[cfg(target_arch = "x86_64")]
+        wide: lanes::Wide::try_new(),
     })
 }
 

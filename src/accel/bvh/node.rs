@@ -1,4 +1,4 @@
-//! Four-wide nodes and the slab test against them.
+//! Eight-wide nodes and the slab test against them.
 //!
 //! The test runs in `f32` and may say "hit" too often but never too rarely:
 //! - The plane nearer along the ray is met from an origin moved a little forward, the farther one
@@ -13,57 +13,59 @@
 //! - A direction component below `1e-18` of the length moves the ray by less than the padding: it
 //!   becomes a huge finite reciprocal, so that no product `0·∞` can arise.
 
-use glam::Vec4;
-
+use super::lanes::Lanes;
 use crate::math::{DVec3, max_abs};
 
-/// Most primitives in a leaf.
-pub(super) const MAX_LEAF: usize = 4;
-/// Bits of a leaf's code that say where it starts.
-pub(super) const OFFSET_BITS: u32 = 27;
+/// Children of a node.
+pub(super) const WIDTH: usize = 8;
+/// Most primitives that a tree can hold.
+pub(super) const MOST_PRIMS: usize = 1 << 27;
 const LEAF: u32 = 1 << 31;
-/// A leaf without primitives.
+/// The leaf without primitives.
 pub(super) const NOTHING: u32 = LEAF;
-/// Most entries that wait during a traversal: three for each level of the deepest tree.
-const STACK: usize = 192;
+/// Most entries that wait during a traversal: seven for each level of the deepest tree.
+const STACK: usize = 7 * 64;
 
-/// Names an inner node, or a leaf by its first primitive and their number.
-pub(super) fn leaf(first: usize, count: usize) -> u32 {
-    debug_assert!(first < 1 << OFFSET_BITS && count <= MAX_LEAF);
-    LEAF | (count as u32) << OFFSET_BITS | first as u32
+/// Names a leaf by its number; number 0 is the one without primitives.
+pub(super) fn leaf(number: usize) -> u32 {
+    debug_assert!(number <= MOST_PRIMS);
+    LEAF | number as u32
 }
 
-/// An inner node: the boxes of up to four children, and their codes.
-#[derive(Clone, Copy, Debug)]
+/// An inner node: the boxes of up to eight children, and their names.
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub(super) struct Node {
     /// Per axis: lower planes, upper planes.
-    pub(super) planes: [[Vec4; 2]; 3],
-    /// See [`leaf`].
-    pub(super) child: [u32; 4],
+    pub(super) planes: [[[f32; WIDTH]; 2]; 3],
+    /// Inner nodes by their index, leaves as [`leaf`] names them.
+    pub(super) child: [u32; WIDTH],
 }
 
 impl Node {
     /// A node whose boxes contain nothing.
     pub(super) const EMPTY: Self = Self {
-        planes: [[Vec4::MAX, Vec4::MIN]; 3],
-        child: [NOTHING; 4],
+        planes: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3],
+        child: [NOTHING; WIDTH],
     };
 }
 
 /// A ray as the slab test sees it; distances are in metres from where the segment begins.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slab {
-    near: [Vec4; 3],
-    far: [Vec4; 3],
-    inv: [Vec4; 3],
-    sign: [usize; 3],
-    tmin: Vec4,
+    pub(super) near: [f32; 3],
+    pub(super) far: [f32; 3],
+    pub(super) inv: [f32; 3],
+    pub(super) sign: [usize; 3],
+    pub(super) tmin: f32,
     len: f64,
     shift: f64,
 }
 
 impl Slab {
+    /// What the far end is scaled by.
+    pub(super) const FAR: f32 = 1.0 + 4.8e-7;
+
     /// The ray `o + t·d`, `t ≥ tmin`, for a tree whose coordinates stay below `reach`, which
     /// exact tests miss by at most `2⁻⁴⁸·slop` of the largest distance. `None` if `d` has no
     /// length.
@@ -84,17 +86,17 @@ impl Slab {
         let mut slab = Self::everything(len);
         slab.shift = shift;
         // Rounded down, as `bound` rounds up.
-        slab.tmin = Vec4::splat((tmin.max(0.0) * len * (1.0 - 2.4e-7)) as f32);
+        slab.tmin = (tmin.max(0.0) * len * (1.0 - 2.4e-7)) as f32;
         for k in 0..3 {
             let pad = (o[k].abs() * 1.2e-7 + floor).copysign(dir[k]);
             slab.sign[k] = usize::from(dir[k].is_sign_negative());
-            slab.near[k] = Vec4::splat((o[k] + pad) as f32);
-            slab.far[k] = Vec4::splat((o[k] - pad) as f32);
-            slab.inv[k] = Vec4::splat(if dir[k].abs() < 1e-18 {
+            slab.near[k] = (o[k] + pad) as f32;
+            slab.far[k] = (o[k] - pad) as f32;
+            slab.inv[k] = if dir[k].abs() < 1e-18 {
                 1e38f32.copysign(dir[k] as f32)
             } else {
                 (1.0 / dir[k]) as f32
-            });
+            };
         }
         Some(slab)
     }
@@ -103,11 +105,11 @@ impl Slab {
     #[inline]
     fn everything(len: f64) -> Self {
         Self {
-            near: [Vec4::ZERO; 3],
-            far: [Vec4::ZERO; 3],
-            inv: [Vec4::ZERO; 3],
+            near: [0.0; 3],
+            far: [0.0; 3],
+            inv: [0.0; 3],
             sign: [0; 3],
-            tmin: Vec4::ZERO,
+            tmin: 0.0,
             len,
             shift: 0.0,
         }
@@ -119,78 +121,77 @@ impl Slab {
         let far = t * self.len - self.shift + 1e-15 * self.shift.abs();
         (far.max(0.0) * (1.0 + 2.4e-7)) as f32
     }
-
-    /// Distances to the four boxes, and which of them are met before `tmax`.
-    #[inline(always)]
-    fn test(&self, node: &Node, tmax: f32) -> (Vec4, u32) {
-        let axis = |k: usize| {
-            let s = self.sign[k] & 1;
-            (
-                (node.planes[k][s] - self.near[k]) * self.inv[k],
-                (node.planes[k][s ^ 1] - self.far[k]) * self.inv[k],
-            )
-        };
-        let ((nx, fx), (ny, fy), (nz, fz)) = (axis(0), axis(1), axis(2));
-        let near = nx.max(ny).max(nz.max(self.tmin));
-        let far = (fx.min(fy).min(fz) * (1.0 + 4.8e-7)).min(Vec4::splat(tmax));
-        (near, near.cmple(far).bitmask())
-    }
 }
 
-/// Visits the leaves that the ray meets, near ones first as far as that is cheap. `visit` gets
-/// the first primitive, their number and the bound, which it may lower; it says whether to go on.
+/// A node that waits: its distance above, so that comparing keys compares distances.
 #[inline(always)]
-pub(super) fn traverse(
+fn key(near: f32, child: u32) -> u64 {
+    // Not negative, but for a zero's sign.
+    u64::from(near.to_bits() & 0x7fff_ffff) << 32 | u64::from(child)
+}
+
+/// What is done at leaves. Not a closure: those are inlined as the compiler likes, and what is
+/// not inlined into a function for other instructions does not have them.
+pub(super) trait Visitor {
+    /// Gets a leaf's number and the bound, which it may lower; says whether to go on.
+    fn visit(&mut self, leaf: usize, bound: &mut f32) -> bool;
+}
+
+/// Visits the leaves that the ray meets, near ones first.
+#[inline(always)]
+pub(super) fn traverse<L: Lanes>(
+    lanes: L,
     nodes: &[Node],
     root: u32,
     slab: &Slab,
     mut tmax: f32,
-    mut visit: impl FnMut(usize, usize, &mut f32) -> bool,
+    visitor: &mut impl Visitor,
 ) {
-    let mut stack = arrayvec::ArrayVec::<(u32, f32), STACK>::new();
+    let mut stack = arrayvec::ArrayVec::<u64, STACK>::new();
     let mut current = root;
     loop {
         if current & LEAF != 0 {
-            let first = (current & ((1 << OFFSET_BITS) - 1)) as usize;
-            let count = ((current & !LEAF) >> OFFSET_BITS) as usize;
-            if !visit(first, count, &mut tmax) {
+            if !visitor.visit((current & !LEAF) as usize, &mut tmax) {
                 return;
             }
         } else {
             let node = &nodes[current as usize];
-            let (near, mut mask) = slab.test(node, tmax);
+            let (near, mut mask) = lanes.boxes(node, slab, tmax);
             if mask != 0 {
-                let near = near.to_array();
-                let mut best = mask.trailing_zeros() as usize & 3;
+                let i = mask.trailing_zeros() as usize & 7;
                 mask &= mask - 1;
+                if mask == 0 {
+                    current = node.child[i];
+                    continue;
+                }
                 // The nearest is next; the others wait, nearer ones above.
+                let mut best = key(near[i], node.child[i]);
                 let base = stack.len();
                 while mask != 0 {
-                    let i = mask.trailing_zeros() as usize & 3;
+                    let i = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
-                    let mut wait = i;
-                    if near[i] < near[best] {
-                        wait = best;
-                        best = i;
+                    let mut wait = key(near[i], node.child[i]);
+                    if wait < best {
+                        std::mem::swap(&mut wait, &mut best);
                     }
-                    stack.push((node.child[wait], near[wait]));
-                }
-                let new = &mut stack[base..];
-                for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-                    if j < new.len() && new[i].1 < new[j].1 {
-                        new.swap(i, j);
+                    stack.push(wait);
+                    let mut at = stack.len() - 1;
+                    while at > base && stack[at - 1] < wait {
+                        stack[at] = stack[at - 1];
+                        at -= 1;
                     }
+                    stack[at] = wait;
                 }
-                current = node.child[best];
+                current = best as u32;
                 continue;
             }
         }
         loop {
-            let Some((next, near)) = stack.pop() else {
+            let Some(next) = stack.pop() else {
                 return;
             };
-            if near <= tmax {
-                current = next;
+            if f32::from_bits((next >> 32) as u32) <= tmax {
+                current = next as u32;
                 break;
             }
         }
@@ -199,6 +200,7 @@ pub(super) fn traverse(
 
 #[cfg(test)]
 mod tests {
+    use super::super::lanes::Portable;
     use super::*;
     use crate::sampling::Rng;
 
@@ -214,8 +216,8 @@ mod tests {
             for k in 0..3 {
                 let lo = if k == 2 { z } else { -scale as f32 };
                 let hi = if k == 2 { z } else { scale as f32 };
-                node.planes[k][0].x = lo;
-                node.planes[k][1].x = hi;
+                node.planes[k][0][0] = lo;
+                node.planes[k][1][0] = hi;
             }
             let mut point = || (rng.next_1d() * 2.0 - 1.0) * scale;
             let target = DVec3::new(point(), point(), f64::from(z));
@@ -228,7 +230,12 @@ mod tests {
             let Some(slab) = Slab::new(o, d, 0.0, scale, 1.0) else {
                 continue;
             };
-            let (_, mask) = slab.test(&node, slab.bound(1.0 / 1.7));
+            let (near, mask) = Portable.boxes(&node, &slab, slab.bound(1.0 / 1.7));
+            #[cfg(target_arch = "x86_64")]
+            if let Some(wide) = super::super::lanes::Wide::try_new() {
+                let other = wide.boxes(&node, &slab, slab.bound(1.0 / 1.7));
+                assert_eq!((near, mask), other);
+            }
             missed += usize::from(mask & 1 == 0);
         }
         assert_eq!(missed, 0, "of 200000");
