@@ -1,7 +1,9 @@
-//! `area`: emissive triangles, uniform over their area, with cosine emission.
+//! `area`: emissive triangles with cosine emission. Photons leave them uniformly over their area;
+//! for a point, triangles that face it are sampled.
 
 use std::f64::consts::PI;
 
+use super::facets::{FEWEST, Facet, Facets};
 use super::{
     EmissionMap, EmissionOrigin, LiSample, Light, LightDesc, LightEntry, surface_importance,
 };
@@ -24,6 +26,9 @@ struct AreaLight {
     triangles: Vec<Triangle>,
     /// In proportion to area, or to flux where a map varies it.
     choose: Discrete,
+    /// For the light that arrives at a point, if there are many.
+    facets: Option<Facets>,
+    areas: Vec<f64>,
     area: f64,
     /// Density in area of uniform points, 1/m².
     pdf_area: f64,
@@ -55,18 +60,42 @@ impl AreaLight {
     #[inline(always)]
     fn point(&self, u: [f64; 2]) -> Option<Point<'_>> {
         let (i, _, rest) = self.choose.sample(u[0])?;
-        let triangle = &self.triangles[i];
-        let b = warp::triangle([rest, u[1]]);
-        let (radiance, pdf_area) = match &self.map {
-            None => (self.radiance, self.pdf_area),
-            Some(m) => (self.radiance * m.map.at(i as u32, b), m.pdf_area[i]),
+        Some(self.point_on(i, self.pdf_area(i), [rest, u[1]]))
+    }
+
+    /// A random point for the light that arrives at `p`.
+    #[inline(always)]
+    fn point_for(&self, p: DVec3, u: [f64; 2]) -> Option<Point<'_>> {
+        let Some(facets) = &self.facets else {
+            return self.point(u);
         };
-        Some(Point {
+        let (i, pdf, rest) = facets.sample(p, u[0])?;
+        Some(self.point_on(i, pdf / self.areas[i], [rest, u[1]]))
+    }
+
+    /// A random point of triangle `i`; `pdf_area` is what makes its density.
+    #[inline(always)]
+    fn point_on(&self, i: usize, pdf_area: f64, u: [f64; 2]) -> Point<'_> {
+        let triangle = &self.triangles[i];
+        let b = warp::triangle(u);
+        Point {
             triangle,
             p: triangle.v0 + triangle.e1 * b[0] + triangle.e2 * b[1],
-            radiance,
+            radiance: match &self.map {
+                None => self.radiance,
+                Some(m) => self.radiance * m.map.at(i as u32, b),
+            },
             pdf_area,
-        })
+        }
+    }
+
+    /// Density in area of points on triangle `i`, 1/m².
+    #[inline]
+    fn pdf_area(&self, i: usize) -> f64 {
+        match &self.map {
+            None => self.pdf_area,
+            Some(m) => m.pdf_area[i],
+        }
     }
 }
 
@@ -83,7 +112,7 @@ impl Light for AreaLight {
 
     #[inline]
     fn sample_li(&self, p: DVec3, u: [f64; 2]) -> Option<LiSample> {
-        let on = self.point(u)?;
+        let on = self.point_for(p, u)?;
         let to = on.p - p;
         let d2 = to.length_squared();
         if !(d2 >= f64::MIN_POSITIVE) {
@@ -112,9 +141,10 @@ impl Light for AreaLight {
         if cos == 0.0 {
             return 0.0;
         }
-        let pdf_area = match &self.map {
-            None => self.pdf_area,
-            Some(m) => m.pdf_area[on.prim as usize],
+        let i = on.prim as usize;
+        let pdf_area = match &self.facets {
+            None => self.pdf_area(i),
+            Some(facets) => facets.probability(p, i) / self.areas[i],
         };
         (on.p - p).length_squared() * pdf_area / cos
     }
@@ -249,6 +279,19 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
             mean,
         }
     });
+    let facets = (triangles.len() >= FEWEST).then(|| {
+        let facet = |(i, corners): (usize, &[DVec3; 3])| {
+            let mut bounds = Aabb::EMPTY;
+            corners.iter().for_each(|&p| bounds.grow(p));
+            Facet {
+                around: bounds.bounding_sphere(),
+                ng: triangles[i].ng,
+                flux: choose.probability(i),
+            }
+        };
+        let facets: Vec<Facet> = d.triangles.iter().enumerate().map(facet).collect();
+        Facets::new(&facets, d.double_sided)
+    });
     let mut around = Aabb::EMPTY;
     for p in d.triangles.iter().flatten() {
         around.grow(*p);
@@ -261,6 +304,8 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
         double_sided: d.double_sided,
         triangles,
         choose,
+        facets,
+        areas,
         area,
         pdf_area: 1.0 / area,
         map,

@@ -10,6 +10,7 @@ mod desc;
 mod directional;
 mod ellipsoid;
 mod environment;
+mod facets;
 mod panel;
 mod point;
 mod sky;
