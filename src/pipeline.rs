@@ -12,13 +12,35 @@ use crate::cameras::{framing, with_lens};
 use crate::control::{Control, Stopped};
 use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
-use crate::film::{Component, Film};
-use crate::integrators::{IntegratorSettings, Region, RenderContext, Spacing, camera_pass};
+use crate::film::{Channel, Component, Film, Layer};
+use crate::integrators::{
+    IntegratorSettings, PixelPlan, Region, RenderContext, Spacing, camera_pass, planned_camera_pass,
+};
 use crate::photons::{PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons};
 use crate::plugins::Registry;
 use crate::sampling::hash2;
 use crate::scene::Scene;
 use crate::stats::{PhotonCounts, RayCounts, StageTime, Statistics, peak_memory};
+
+/// How camera samples are shared among pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum PixelSampling {
+    /// Each pixel has as many.
+    #[default]
+    Uniform,
+    /// More where edges are forecast or samples differ; not with [`Progressive`].
+    Adaptive,
+}
+
+impl PixelSampling {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Adaptive => "adaptive",
+        }
+    }
+}
 
 /// What to render, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +59,8 @@ pub struct RenderSettings {
     pub height: u32,
     /// Camera samples per pixel.
     pub spp: u32,
+    /// How samples are shared among pixels.
+    pub pixel_sampling: PixelSampling,
     /// Whether to render in independent passes, whose spread tells the error, and when to end.
     pub progressive: Option<Progressive>,
     /// Part of the image to render: left, top, right, bottom in pixels; the rest stays black.
@@ -59,6 +83,7 @@ impl Default for RenderSettings {
             width: 512,
             height: 512,
             spp: 16,
+            pixel_sampling: PixelSampling::Uniform,
             progressive: None,
             crop: None,
             camera: None,
@@ -189,6 +214,14 @@ fn render_in_pool(
         None => settings.spp,
     };
     let spacing = Spacing::new(settings.width, settings.height, spacing_spp);
+    let adaptive = settings.pixel_sampling == PixelSampling::Adaptive;
+    if adaptive && settings.progressive.is_some() {
+        return Err(Error::Usage(
+            "adaptive pixel sampling and independent passes exclude each other; leave one out"
+                .into(),
+        ));
+    }
+    let mut plan: Option<PixelPlan> = None;
     let mut rays = RayCounts::default();
     let [mut global_photons, mut caustic_photons] = [PhotonCounts::default(); 2];
     let target = settings.progressive.as_ref().and_then(|p| p.target_error);
@@ -248,18 +281,33 @@ fn render_in_pool(
             true => (hash2(options.seed, u64::from(passes)), 0..samples),
             false => (options.seed, done..done + samples),
         };
-        let camera_rays = camera_pass(
-            &*camera,
-            &*integrator,
-            seed,
-            range,
-            &spacing,
-            !scene.textures.is_empty(),
-            region,
-            &mut film,
-            &mut |film| (session.watch)(film, &forecast.standing(film, done, false)),
-            inner,
-        );
+        let differentials = !scene.textures.is_empty();
+        let camera_rays = if adaptive {
+            planned_camera_pass(
+                &mut plan,
+                &context,
+                &*camera,
+                &*integrator,
+                samples,
+                (&spacing, differentials),
+                region,
+                &mut film,
+                inner,
+            )
+        } else {
+            camera_pass(
+                &*camera,
+                &*integrator,
+                seed,
+                range,
+                &spacing,
+                differentials,
+                region,
+                &mut film,
+                &mut |film| (session.watch)(film, &forecast.standing(film, done, false)),
+                inner,
+            )
+        };
         rays.add(&camera_rays);
         clock.lap("pixels");
         if in_passes && control.stopped().is_some() {
@@ -276,6 +324,9 @@ fn render_in_pool(
         }
     }
 
+    if let Some(plan) = &plan {
+        film.attach(plan_layer(plan, &film));
+    }
     let built = accel.stats();
     Ok(Rendering {
         statistics: Statistics {
@@ -295,6 +346,25 @@ fn render_in_pool(
         stopped: control.stopped(),
         effects: effects.decisions,
     })
+}
+
+/// What a plan foresaw of each pixel, and what came of it.
+fn plan_layer(plan: &PixelPlan, film: &Film) -> Layer {
+    let channel = |name: &str, data| Channel {
+        name: name.into(),
+        half: false,
+        data,
+    };
+    Layer {
+        name: "pixels".into(),
+        channels: vec![
+            channel("edges", plan.edges(film)),
+            channel(
+                "samples",
+                film.samples().iter().map(|n| *n as f32).collect(),
+            ),
+        ],
+    }
 }
 
 /// The components of the image that the effects leave.

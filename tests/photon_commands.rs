@@ -1,11 +1,17 @@
-//! `dualight photons`: stored photons as the camera sees them.
+//! `dualight photons`, stored photons as the camera sees them, and `dualight reproduce`, the
+//! paper's experiment.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use std::path::Path;
 use std::process::{Command, Output};
 
+use dualight::control::Control;
 use dualight::film::Image;
+use dualight::import::{self, ImportOptions};
 use dualight::output;
+use dualight::photons::{EmissionContext, PhotonSettings, Purpose, follow_photons};
+use dualight::plugins::Registry;
+use dualight::report::reproduction::CONTESTANTS;
 
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/box.gltf");
 
@@ -99,5 +105,94 @@ fn the_table_tells_what_was_stored_and_seen_and_mistakes_are_told() {
         let said = String::from_utf8(out.stderr).unwrap();
         assert_eq!(out.status.code(), Some(2), "{said}");
         assert!(said.contains(part), "{said}");
+    }
+}
+
+/// Cells of a row of the report's table, without what the paper has.
+fn row(report: &str, name: &str) -> Vec<u64> {
+    let line = report
+        .lines()
+        .find(|l| l.starts_with(&format!("| {name} |")))
+        .unwrap_or_else(|| panic!("no row {name}"));
+    let cells = line.trim_matches('|').split('|').skip(1);
+    let own = |c: &str| c.split('(').next().unwrap().replace(' ', "");
+    cells.map(|c| own(c).parse().unwrap()).collect()
+}
+
+/// What docs/reproduction.md says of photons is what the program does.
+#[test]
+fn the_counts_of_the_reproduction_are_still_true() {
+    let report = include_str!("../docs/reproduction.md");
+    let registry = Registry::builtin();
+    let path = Path::new(SCENE);
+    let scene = import::load(path, &ImportOptions::default(), registry.scene.clone()).unwrap();
+    let backend = registry.accelerators.choose(None).unwrap();
+    let accel = (backend.build)(&scene.geometry, 2).unwrap();
+    for (k, contestant) in CONTESTANTS.iter().enumerate() {
+        let emission = registry.emissions.find(contestant.emission).unwrap();
+        for (map, purpose) in [Purpose::Global, Purpose::Caustic].into_iter().enumerate() {
+            let settings = PhotonSettings {
+                seed: 0,
+                global: contestant.photons[0],
+                caustic: contestant.photons[1],
+                nearest: 50,
+                max_depth: None,
+                roulette: true,
+            };
+            let source = (emission.build)(&EmissionContext {
+                scene: &scene,
+                accel: &*accel,
+                seed: settings.seed,
+                purpose,
+                count: contestant.photons[map],
+            });
+            let control = Control::default();
+            let counts =
+                follow_photons(&scene, &*accel, &*source, purpose, &settings, &control).counts;
+            for (what, n) in [
+                ("emitted", counts.emitted),
+                ("check rays", counts.checked),
+                ("stored", counts.stored),
+            ] {
+                let name = format!("{what}, {} map", ["global", "caustic"][map]);
+                let told = row(report, &name)[k];
+                // Rounding differs from processor to processor, and single paths with it.
+                let slack = 3.0 + 1e-3 * told as f64;
+                assert!(
+                    (n as f64 - told as f64).abs() <= slack,
+                    "{name}, {}: {told} in docs/reproduction.md, now {n}; run dualight reproduce",
+                    contestant.title
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_experiment_writes_a_report_with_its_pictures() {
+    let directory = tempfile::tempdir().unwrap();
+    let d = directory.path();
+    let out = Command::new(env!("CARGO_BIN_EXE_dualight"))
+        .args(["reproduce", SCENE, "-o", "r.md", "-q"])
+        .args("--size 16x16 --spp 1 --reference-spp 4 --repeats 2".split(' '))
+        .current_dir(d)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success() && said.is_empty(), "{said}");
+    let report = std::fs::read_to_string(d.join("r.md")).unwrap();
+    // Whole numbers of photons, whatever the picture.
+    assert_eq!(row(&report, "emitted, global map")[0], 100_000);
+    assert!(row(&report, "check rays, global map")[2] > 1000);
+    for word in ["(368 558)", "(631)", "relMSE", "path traced"] {
+        assert!(report.contains(word), "{word}: {report}");
+    }
+    for c in CONTESTANTS {
+        for what in ["photons", "picture"] {
+            let name = format!("reproduction-{what}-{}.png", c.name);
+            assert!(report.contains(&name), "{name}");
+            let image = image::open(d.join("images").join(&name)).unwrap();
+            assert_eq!((image.width(), image.height()), (16, 16));
+        }
     }
 }

@@ -7,9 +7,10 @@ use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::measure_args::{AccuracyArgs, BenchArgs};
-use super::photon_args::PhotonsArgs;
+use super::photon_args::{PhotonsArgs, ReproduceArgs};
 use super::quality::Quality;
 use super::values::{self, Crop, Size};
+use crate::pipeline::PixelSampling;
 use crate::report::ErrorMap;
 
 /// A photon-mapping renderer for glTF scenes.
@@ -57,6 +58,8 @@ pub enum Command {
     Bench(BenchArgs),
     /// Draw the stored photons as the camera sees them
     Photons(PhotonsArgs),
+    /// Do the paper's experiment: conventional against adaptive emission of half as many photons
+    Reproduce(ReproduceArgs),
 }
 
 /// What the numbers of a file's lights mean.
@@ -161,6 +164,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = values::positive_u32)]
     #[arg(help_heading = "Image")]
     pub spp: Option<u32>,
+    /// How samples are shared among pixels: evenly, or more where edges are forecast and samples
+    /// differ. Adaptive is for a known --spp, not for images in passes
+    #[arg(long, value_enum, default_value = "uniform", help_heading = "Image")]
+    pub pixel_sampling: PixelSampling,
     /// Camera to look through; auto frames the whole scene [default: the first of the scene]
     #[arg(long, value_name = "NAME", help_heading = "Image")]
     pub camera: Option<String>,

@@ -19,6 +19,7 @@ mod plugins;
 pub mod progress;
 pub mod quality;
 mod render;
+mod reproduce;
 mod signal;
 mod summary;
 pub mod values;
@@ -69,5 +70,6 @@ pub fn run(cli: &Cli) -> Result<Ending> {
         Command::Accuracy(args) => accuracy::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Photons(args) => photons::run(args),
+        Command::Reproduce(args) => reproduce::run(args),
     }
 }

@@ -48,3 +48,38 @@ pub struct PhotonsArgs {
     #[arg(short, long)]
     pub quiet: bool,
 }
+
+/// Options of `dualight reproduce`.
+#[derive(Clone, Debug, Args)]
+pub struct ReproduceArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as the help of the command")]
+    pub scene: SceneArgs,
+    /// Report to write, in Markdown; its pictures go to a folder named images beside it
+    #[arg(short, long, value_name = "FILE.md")]
+    pub output: PathBuf,
+    /// Image to judge by (.exr), of the same size [default: computed by path]
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference: Option<PathBuf>,
+    /// Camera samples per pixel of a computed reference
+    #[arg(long, value_name = "N", default_value = "1024", value_parser = values::positive_u32)]
+    pub reference_spp: u32,
+    /// Camera samples per pixel
+    #[arg(long, value_name = "N", default_value = "16", value_parser = values::positive_u32)]
+    pub spp: u32,
+    /// Size of the pictures in pixels
+    #[arg(long, value_name = "WxH", default_value = "256x256")]
+    pub size: Size,
+    /// How often everything is done, in turns and each time with another seed
+    #[arg(long, value_name = "N", default_value = "3", value_parser = values::positive_u32)]
+    pub repeats: u32,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Threads [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = values::positive_u32)]
+    pub threads: Option<u32>,
+    /// Print nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits};
 use crate::integrators::IntegratorSettings;
 use crate::output::{self, OutputSettings};
-use crate::pipeline::{Progressive, RenderSettings};
+use crate::pipeline::{PixelSampling, Progressive, RenderSettings};
 use crate::plugins::Registry;
 use crate::scene::Scene;
 
@@ -78,6 +78,13 @@ impl Plan {
         for path in &args.outputs {
             output::format_of(&registry.outputs, path)?;
         }
+        if args.pixel_sampling == PixelSampling::Adaptive && progressive(args).is_some() {
+            return Err(Error::Usage(
+                "--pixel-sampling adaptive shares out a known --spp; leave out --target-error, \
+                 --time-limit, --write-every and --resume"
+                    .into(),
+            ));
+        }
         let plan = Self {
             scene: args.scene.file.clone(),
             import: import_options(&args.scene),
@@ -105,6 +112,7 @@ impl Plan {
                     Some(_) => u32::MAX,
                     None => args.quality.spp(),
                 }),
+                pixel_sampling: args.pixel_sampling,
                 progressive: progressive(args),
                 crop: args.crop.map(|c| c.0),
                 camera: args.camera.clone(),

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::format::{bytes, count};
 use crate::control::Stopped;
 use crate::output::Metadata;
-use crate::pipeline::{RenderSettings, Rendering};
+use crate::pipeline::{PixelSampling, RenderSettings, Rendering};
 use crate::stats::PhotonCounts;
 
 /// Everything there is to tell.
@@ -28,10 +28,13 @@ pub(super) fn table(s: &Summary) -> String {
     let mut rows: Vec<(&str, String)> = vec![(
         "rendered",
         format!(
-            "{}x{} pixels, {} samples each, integrator {}",
+            "{}x{} pixels, {}, integrator {}",
             r.width,
             r.height,
-            s.metadata.spp,
+            match r.pixel_sampling {
+                PixelSampling::Uniform => format!("{} samples each", s.metadata.spp),
+                PixelSampling::Adaptive => format!("{} samples in the mean", r.spp),
+            },
             r.integrator.as_deref().unwrap_or_default()
         ),
     )];
@@ -147,6 +150,7 @@ pub(super) fn json(s: &Summary) -> String {
             "integrator": r.integrator,
             "accelerator": r.accelerator,
             "emission": r.emission,
+            "pixel_sampling": r.pixel_sampling.name(),
             "effects": r.effects,
             "width": r.width,
             "height": r.height,

@@ -66,6 +66,21 @@ impl PixelSample {
         self.radiance[component as usize] += radiance;
     }
 
+    /// Adds another sum of samples.
+    pub fn merge(&mut self, o: &Self) {
+        for (a, b) in self.radiance.iter_mut().zip(o.radiance) {
+            *a += b;
+        }
+        self.alpha += o.alpha;
+        self.albedo += o.albedo;
+        self.normal += o.normal;
+        self.position += o.position;
+        self.depth += o.depth;
+        for (a, b) in self.photons.iter_mut().zip(o.photons) {
+            *a += b;
+        }
+    }
+
     /// Sum over the components.
     pub fn beauty(&self) -> Rgb {
         self.radiance.iter().copied().sum()
@@ -117,6 +132,7 @@ pub struct Film {
     first_rejected: Option<[u32; 2]>,
     kept: [bool; 4],
     passes: Option<passes::Passes>,
+    attached: Vec<Layer>,
 }
 
 impl Film {
@@ -132,7 +148,13 @@ impl Film {
             first_rejected: None,
             kept: [true; 4],
             passes: None,
+            attached: Vec::new(),
         }
+    }
+
+    /// Develops with another layer, row by row as wide and high as the film, beside its own.
+    pub fn attach(&mut self, layer: Layer) {
+        self.attached.push(layer);
     }
 
     /// Keeps only these components of what is added from now on.
@@ -312,6 +334,7 @@ impl Film {
                     .collect(),
             }
         }));
+        layers.extend(self.attached.iter().cloned());
         Image {
             width: self.width,
             height: self.height,

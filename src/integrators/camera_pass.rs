@@ -34,8 +34,41 @@ pub struct Region {
     pub y1: u32,
 }
 
+/// Where camera samples begin.
+pub(super) struct View<'a> {
+    pub(super) camera: &'a dyn Camera,
+    pub(super) seed: u64,
+    pub(super) spacing: &'a Spacing,
+    /// Whether rays carry differentials.
+    pub(super) differentials: bool,
+    /// Width of the image in pixels.
+    pub(super) width: u32,
+}
+
+impl View<'_> {
+    /// Sample `number` of a pixel, to be added to sum `sum`.
+    pub(super) fn sample(&self, [px, py]: [u32; 2], number: u32, sum: usize) -> Sample {
+        let key = u64::from(py) * u64::from(self.width) + u64::from(px);
+        let mut sampler = Sampler::new(self.seed, stream::CAMERA, key, u64::from(number));
+        let [jx, jy] = sampler.next_2d();
+        let (x, y) = (f64::from(px) + jx, f64::from(py) + jy);
+        let lens = if self.camera.has_lens() {
+            sampler.next_2d()
+        } else {
+            [0.5; 2]
+        };
+        Sample {
+            camera: self
+                .spacing
+                .camera_ray(self.camera, x, y, lens, self.differentials),
+            sampler,
+            pixel: sum,
+        }
+    }
+}
+
 impl Region {
-    fn tiles(&self) -> Vec<(u32, u32, u32, u32)> {
+    pub(super) fn tiles(&self) -> Vec<(u32, u32, u32, u32)> {
         let mut out = Vec::new();
         for y in (self.y0..self.y1).step_by(TILE as usize) {
             for x in (self.x0..self.x1).step_by(TILE as usize) {
@@ -66,7 +99,13 @@ pub fn camera_pass(
     let pixels = u64::from(region.x1 - region.x0) * u64::from(region.y1 - region.y0);
     let stage = control.stage("pixels", "samples", pixels * samples.len() as u64);
     let tiles = region.tiles();
-    let width = film.width();
+    let view = View {
+        camera,
+        seed,
+        spacing,
+        differentials,
+        width: film.width(),
+    };
     let mut rays = RayCounts::default();
     let Range { start, end } = samples;
     let mut done = start;
@@ -98,21 +137,8 @@ pub fn camera_pass(
                         if batch.len() + samples as usize > BATCH {
                             take(&mut batch);
                         }
-                        let key = u64::from(py) * u64::from(width) + u64::from(px);
                         for s in first..first + samples {
-                            let mut sampler = Sampler::new(seed, stream::CAMERA, key, u64::from(s));
-                            let [jx, jy] = sampler.next_2d();
-                            let (x, y) = (f64::from(px) + jx, f64::from(py) + jy);
-                            let lens = if camera.has_lens() {
-                                sampler.next_2d()
-                            } else {
-                                [0.5; 2]
-                            };
-                            batch.push(Sample {
-                                camera: spacing.camera_ray(camera, x, y, lens, differentials),
-                                sampler,
-                                pixel,
-                            });
+                            batch.push(view.sample([px, py], s, pixel));
                             if batch.is_full() {
                                 take(&mut batch);
                             }

@@ -7,11 +7,14 @@ mod gather;
 mod light_sampling;
 mod path;
 mod photon;
+mod pixel_edges;
+mod pixel_plan;
 mod settings;
 mod stored_light;
 
 pub use camera_pass::{Region, camera_pass};
 pub use footprint::Spacing;
+pub use pixel_plan::{PixelPlan, planned_camera_pass};
 pub use settings::IntegratorSettings;
 
 use crate::accel::Accelerator;

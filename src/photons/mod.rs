@@ -24,6 +24,7 @@ mod targets;
 mod trace;
 mod uniform;
 
+pub(crate) use adaptive::{Beam, Caster, Sight, casters};
 pub use emit::{EMISSIONS, EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
 pub use ledger::Ledger;
 pub use map::{IrradianceMap, PhotonMap};

@@ -9,6 +9,7 @@ mod error_image;
 mod flip;
 pub mod photon_view;
 pub mod rays;
+pub mod reproduction;
 pub mod statistics;
 pub mod svg;
 

@@ -14,16 +14,16 @@ const MOST_SPHERES: usize = 256;
 
 /// Something that rays may hit.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Caster {
-    pub(super) object: u32,
-    pub(super) sphere: BoundingSphere,
+pub(crate) struct Caster {
+    pub(crate) object: u32,
+    pub(crate) sphere: BoundingSphere,
     /// Whether it is a sphere itself, so that its outline is its silhouette.
-    pub(super) exact: bool,
+    pub(crate) exact: bool,
 }
 
 /// How the rays of a cell pass a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Sight {
+pub(crate) enum Sight {
     /// No ray meets it.
     Outside,
     /// Every ray does.
@@ -35,16 +35,16 @@ pub(super) enum Sight {
 /// The rays of a cell: around one ray, turned or shifted by up to `reach`, from origins up to
 /// `spread` away.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Beam {
-    pub(super) o: DVec3,
-    pub(super) d: DVec3,
-    pub(super) reach: f64,
-    pub(super) spread: f64,
-    pub(super) moves: Moves,
+pub(crate) struct Beam {
+    pub(crate) o: DVec3,
+    pub(crate) d: DVec3,
+    pub(crate) reach: f64,
+    pub(crate) spread: f64,
+    pub(crate) moves: Moves,
 }
 
 impl Beam {
-    pub(super) fn new(ray: &Ray, reach: f64, spread: f64, moves: Moves) -> Self {
+    pub(crate) fn new(ray: &Ray, reach: f64, spread: f64, moves: Moves) -> Self {
         Self {
             o: ray.origin(),
             d: ray.direction(),
@@ -55,7 +55,7 @@ impl Beam {
     }
 
     /// Its half width at a distance.
-    pub(super) fn width(&self, distance: f64) -> f64 {
+    pub(crate) fn width(&self, distance: f64) -> f64 {
         match self.moves {
             Moves::Target => self.reach * distance,
             Moves::Ray => self.reach,
@@ -88,7 +88,7 @@ impl Beam {
     }
 
     /// How it passes a sphere.
-    pub(super) fn sight(&self, s: &BoundingSphere, order: Order) -> Sight {
+    pub(crate) fn sight(&self, s: &BoundingSphere, order: Order) -> Sight {
         let to = s.center - self.o;
         let dist = to.length();
         let outer = s.radius + self.spread;
@@ -151,7 +151,7 @@ impl Beam {
 }
 
 /// Everything in the scene that a cell may hold; for caustics only what is specular.
-pub(super) fn casters(scene: &Scene, specular_only: bool) -> Vec<Caster> {
+pub(crate) fn casters(scene: &Scene, specular_only: bool) -> Vec<Caster> {
     let g = &scene.geometry;
     let mut out = Vec::new();
     for id in (0..g.objects.len() as u32).map(ObjectId) {

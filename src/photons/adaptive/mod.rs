@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use self::casters::casters;
+pub(crate) use self::casters::{Beam, Caster, Sight, casters};
 use self::domain::{Tree, trees};
 use self::plan::{Leaf, Planner};
 use super::Targets;
