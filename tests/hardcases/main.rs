@@ -13,6 +13,7 @@ mod deposits;
 mod dual;
 mod duals;
 mod exact;
+mod fuzz;
 mod photons;
 mod refraction;
 mod report;
@@ -80,4 +81,14 @@ rows! { "hardcases";
     p1: "bookkeeping of flux" in photons;
     p3: "extremes of gathering" in photons;
     p4: "thin wall" in photons;
+    f1: "any triangle, any ray" in fuzz;
+    f2: "any sphere, any ray" in fuzz;
+}
+
+/// An overflow would otherwise be a wrong count that looks right.
+#[test]
+fn numbers_that_overflow_stop_a_test() {
+    let most = std::hint::black_box(u64::MAX);
+    let sum = std::panic::catch_unwind(|| std::hint::black_box(most + std::hint::black_box(1)));
+    assert!(sum.is_err(), "overflow checks are off");
 }

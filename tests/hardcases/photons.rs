@@ -13,7 +13,9 @@ use dualight::scene::SceneBuilder;
 use dualight::accel::ACCELERATORS;
 use dualight::control::Control;
 use dualight::effects::EffectSet;
-use dualight::photons::{EMISSIONS, PhotonMaps, PhotonSettings, trace_photons};
+use dualight::photons::{
+    EMISSIONS, EmissionContext, PhotonMaps, PhotonSettings, Purpose, trace_photons,
+};
 use dualight::scene::Scene;
 use dualight::stats::PhotonCounts;
 
@@ -57,6 +59,51 @@ pub fn p1(row: &mut Row) {
         }
     }
     row.line("photons", "flux unaccounted for", m, 1e-9);
+    row.line(
+        "photons",
+        "brightness of 2³³ photons",
+        beyond_32_bits(&scene),
+        3e-3,
+    );
+}
+
+/// Of an emission with more photons than 32 bits count, every so many-th: their share of the
+/// flux is their share of the number, and they go as those of a small emission go.
+fn beyond_32_bits(scene: &Scene) -> Meter {
+    const ALL: u64 = (1 << 33) + 7;
+    let accel = (ACCELERATORS[0].build)(&scene.geometry, 2).unwrap();
+    let source = (EMISSIONS[0].build)(&EmissionContext {
+        scene,
+        accel: &*accel,
+        seed: 3,
+        purpose: Purpose::Global,
+        count: ALL,
+    });
+    let mut m = Meter::default();
+    m.see((source.len() as f64 / ALL as f64 - 1.0).abs());
+    // The low half, and the half that a 32-bit count would take for the low one again.
+    for half in 0..2 {
+        let picked = (0..20_000u64).map(|k| half * (1 << 32) + k * ((1 << 32) / 20_000));
+        let (mut sum, mut n) = (Rgb::ZERO, 0);
+        let mut met = 0;
+        for i in picked {
+            n += 1;
+            let Some(photon) = source.emit(i) else {
+                continue;
+            };
+            sum += photon.power;
+            met += u32::from(accel.intersect(&photon.ray).is_some());
+        }
+        let flux = (sum / f64::from(n) * ALL as f64).luminance();
+        m.see((flux / scene.flux().luminance() - 1.0).abs());
+        assert!(met > 9000, "photons of the box meet it: {met}");
+    }
+    // Books of that many photons: a sum of shares is the whole.
+    let first = source.emit(0).unwrap();
+    let last = source.emit(ALL - 1).unwrap();
+    m.see((first.power.luminance() * ALL as f64 / scene.flux().luminance() - 1.0).abs());
+    m.see((last.power.luminance() / first.power.luminance() - 1.0).abs());
+    m
 }
 
 fn photons(places: impl Iterator<Item = DVec3>) -> Vec<Photon> {
