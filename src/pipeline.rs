@@ -14,7 +14,8 @@ use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
 use crate::film::{Channel, Component, Film, Layer};
 use crate::integrators::{
-    IntegratorSettings, PixelPlan, Region, RenderContext, Spacing, camera_pass, planned_camera_pass,
+    IntegratorSettings, PixelPlan, Region, RenderContext, Spacing, Visibility, camera_pass,
+    planned_camera_pass,
 };
 use crate::photons::{PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons};
 use crate::plugins::Registry;
@@ -242,6 +243,7 @@ fn render_in_pool(
         (done, session.seconds),
     );
     let mut standing = forecast.standing(&film, done, true);
+    let visibility = Visibility::learn(scene, &*accel, &*camera, &spacing, options.seed);
     while done < settings.spp && control.stopped().is_none() && !standing.reached(target) {
         let mut samples = settings.spp - done;
         let mut maps = PhotonMaps::default();
@@ -271,6 +273,7 @@ fn render_in_pool(
         let context = RenderContext {
             scene,
             accel: &*accel,
+            visibility: &visibility,
             maps: &maps,
             effects: effects.set,
             settings: options,

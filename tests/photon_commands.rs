@@ -156,8 +156,14 @@ fn the_counts_of_the_reproduction_are_still_true() {
             ] {
                 let name = format!("{what}, {} map", ["global", "caustic"][map]);
                 let told = row(report, &name)[k];
-                // Rounding differs from processor to processor, and single paths with it.
-                let slack = 3.0 + 1e-3 * told as f64;
+                // Rounding differs between processors and backends, and single paths with it. Where
+                // the plan learns from hits, one that differs makes of all that follows another
+                // sample: then four standard deviations.
+                let slack = if counts.checked > 0 {
+                    3.0 + 4.0 * (told as f64).sqrt()
+                } else {
+                    3.0 + 1e-3 * told as f64
+                };
                 assert!(
                     (n as f64 - told as f64).abs() <= slack,
                     "{name}, {}: {told} in docs/reproduction.md, now {n}; run dualight reproduce",

@@ -143,7 +143,7 @@ impl PhotonMapping<'_> {
                 seen += beta
                     * match on {
                         Seen::Light(on, footprint) => {
-                            let pdf_light = cx.scene.pdf_light(sp.p, on);
+                            let pdf_light = cx.pdf_light(sp.p, on);
                             cx.scene.emitted(on, footprint)
                                 * power_heuristic(n_gather, s.pdf, shadow, pdf_light)
                         }

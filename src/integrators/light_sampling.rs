@@ -51,7 +51,7 @@ impl View {
     /// density `pdf`.
     fn weight(&self, cx: &RenderContext<'_>, id: LightId, pdf: f64) -> f64 {
         self.last.map_or(1.0, |(pdf_bsdf, from)| {
-            let pdf_light = pdf * cx.scene.light_probability(from, id);
+            let pdf_light = pdf * cx.light_probability(from, id);
             power_heuristic(self.n_bsdf, pdf_bsdf, self.n_light, pdf_light)
         })
     }
@@ -116,7 +116,7 @@ pub(super) fn sample_direct(
     n_light: f64,
     n_bsdf: f64,
 ) -> Option<DirectSample> {
-    let (id, p_pick, rest) = cx.scene.pick_light(sp.p, u[0])?;
+    let (id, p_pick, rest) = cx.pick_light(sp.p, u[0])?;
     let light = cx.scene.light(id);
     let li = light.sample_li(sp.p, [rest, u[1]])?;
     let pdf = li.pdf * p_pick;

@@ -11,16 +11,19 @@ mod pixel_edges;
 mod pixel_plan;
 mod settings;
 mod stored_light;
+mod visibility;
 
 pub use camera_pass::{Region, camera_pass};
 pub use footprint::Spacing;
 pub use pixel_plan::{PixelPlan, planned_camera_pass};
 pub use settings::IntegratorSettings;
+pub use visibility::Visibility;
 
 use crate::accel::Accelerator;
 use crate::effects::EffectSet;
 use crate::film::PixelSample;
-use crate::geometry::{Differential, Ray};
+use crate::geometry::{Differential, LightId, Ray, SurfacePoint};
+use crate::math::DVec3;
 use crate::photons::PhotonMaps;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
@@ -33,12 +36,35 @@ pub struct RenderContext<'a> {
     pub scene: &'a Scene,
     /// Its ray tracer.
     pub accel: &'a dyn Accelerator,
+    /// Which lights reach where.
+    pub visibility: &'a Visibility,
     /// The photon maps; empty for integrators that want none.
     pub maps: &'a PhotonMaps,
     /// The effects that are simulated.
     pub effects: EffectSet,
     /// What the integrator is told.
     pub settings: &'a IntegratorSettings,
+}
+
+impl RenderContext<'_> {
+    /// As [`Scene::pick_light`], by what points see.
+    #[inline(always)]
+    fn pick_light(&self, p: DVec3, u: f64) -> Option<(LightId, f64, f64)> {
+        self.scene.pick_light(p, self.visibility.at(p), u)
+    }
+
+    /// As [`Scene::light_probability`], by what points see.
+    #[inline]
+    fn light_probability(&self, p: DVec3, id: LightId) -> f64 {
+        let seen = self.visibility.at(p);
+        self.scene.light_probability(p, seen, id)
+    }
+
+    /// As [`Scene::pdf_light`], by what points see.
+    #[inline]
+    fn pdf_light(&self, from: DVec3, on: &SurfacePoint) -> f64 {
+        self.scene.pdf_light(from, on, self.visibility.at(from))
+    }
 }
 
 /// Estimates radiance along camera rays.

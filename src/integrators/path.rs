@@ -203,7 +203,7 @@ impl Path<'_> {
             let le = cx.scene.emitted(sp, trail.footprint());
             if !le.is_black() {
                 let weight = w.last.map_or(1.0, |(pdf, from)| {
-                    power_heuristic(1.0, pdf, 1.0, cx.scene.pdf_light(from, sp))
+                    power_heuristic(1.0, pdf, 1.0, cx.pdf_light(from, sp))
                 });
                 out.add(w.walk.component(), w.beta * le * weight);
             }

@@ -138,7 +138,7 @@ impl PhotonMapping<'_> {
             }
             if sp.light.is_some() {
                 let weight = last.map_or(1.0, |(pdf, from)| {
-                    power_heuristic(1.0, pdf, 1.0, cx.scene.pdf_light(from, &sp))
+                    power_heuristic(1.0, pdf, 1.0, cx.pdf_light(from, &sp))
                 });
                 out.add(
                     component,

@@ -100,7 +100,7 @@ impl RayMaker<'_> {
                 let ray = self.camera_ray(rng);
                 let ray = self.follow(ray, bounces, TransportMode::Radiance, rng)?;
                 let sp = self.hit(&ray)?;
-                let (id, _, rest) = self.scene.pick_light(sp.p, rng.next_1d())?;
+                let (id, _, rest) = self.scene.pick_light(sp.p, None, rng.next_1d())?;
                 let li = self
                     .scene
                     .light(id)

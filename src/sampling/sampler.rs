@@ -18,6 +18,8 @@ pub mod stream {
     pub const GLOBAL_PHOTONS: u64 = 2;
     /// Caustic photons; the key is the light.
     pub const CAUSTIC_PHOTONS: u64 = 3;
+    /// Trials of what lights reach.
+    pub const TRIALS: u64 = 5;
     /// Anything a test or tool needs.
     pub const TOOL: u64 = 4;
     /// Pilot photons. No number of a pass, whose seeds are made alike.

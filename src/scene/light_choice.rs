@@ -55,9 +55,22 @@ impl LightChoice {
         &self.bodiless
     }
 
-    /// Probabilities at `p`; `None` if no light reaches it.
-    fn weights(&self, lights: &[Box<dyn Light>], p: DVec3) -> Option<Weights> {
+    /// Whether lights are weighed one by one at every point.
+    pub fn weighs(&self) -> bool {
+        self.n > 1 && self.n <= MOST_WEIGHED
+    }
+
+    /// Probabilities at `p`, of which each light is `seen` so far; `None` if no light reaches it.
+    fn weights(
+        &self,
+        lights: &[Box<dyn Light>],
+        p: DVec3,
+        seen: Option<&[f32]>,
+    ) -> Option<Weights> {
         let mut w: Weights = lights.iter().map(|l| l.importance(p)).collect();
+        for (w, seen) in w.iter_mut().zip(seen.into_iter().flatten()) {
+            *w *= f64::from(*seen);
+        }
         let (mut sum, mut able) = (0.0, 0u32);
         for x in &mut w {
             if !(*x > 0.0) {
@@ -81,16 +94,23 @@ impl LightChoice {
         Some(w)
     }
 
-    /// The light chosen by `u` at `p`, its probability, and `u` rescaled to `[0, 1)`.
+    /// The light chosen by `u` at `p`, its probability, and `u` rescaled to `[0, 1)`. `seen` is the
+    /// share of each light that points around there see, as far as known; positive.
     #[inline]
-    pub fn sample(&self, lights: &[Box<dyn Light>], p: DVec3, u: f64) -> Option<(usize, f64, f64)> {
+    pub fn sample(
+        &self,
+        lights: &[Box<dyn Light>],
+        p: DVec3,
+        seen: Option<&[f32]>,
+        u: f64,
+    ) -> Option<(usize, f64, f64)> {
         if self.n == 1 {
             return Some((0, 1.0, u));
         }
         if self.n > MOST_WEIGHED {
             return self.by_flux.sample(u);
         }
-        let weights = self.weights(lights, p)?;
+        let weights = self.weights(lights, p, seen)?;
         let mut rest = u;
         let mut last = None;
         for (i, &w) in weights.iter().enumerate() {
@@ -109,13 +129,19 @@ impl LightChoice {
 
     /// Probability that light `i` is chosen at `p`.
     #[inline]
-    pub fn probability(&self, lights: &[Box<dyn Light>], p: DVec3, i: usize) -> f64 {
+    pub fn probability(
+        &self,
+        lights: &[Box<dyn Light>],
+        p: DVec3,
+        seen: Option<&[f32]>,
+        i: usize,
+    ) -> f64 {
         if self.n == 1 {
             return 1.0;
         }
         if self.n > MOST_WEIGHED {
             return self.by_flux.probability(i);
         }
-        self.weights(lights, p).map_or(0.0, |w| w[i])
+        self.weights(lights, p, seen).map_or(0.0, |w| w[i])
     }
 }

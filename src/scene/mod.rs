@@ -118,9 +118,9 @@ impl Scene {
 
     /// The density in solid angle with which light sampling at `from` finds the emitter at `on`.
     #[inline]
-    pub fn pdf_light(&self, from: DVec3, on: &SurfacePoint) -> f64 {
+    pub fn pdf_light(&self, from: DVec3, on: &SurfacePoint, seen: Option<&[f32]>) -> f64 {
         on.light.map_or(0.0, |id| {
-            self.light(id).pdf_li(from, on) * self.light_probability(from, id)
+            self.light(id).pdf_li(from, on) * self.light_probability(from, seen, id)
         })
     }
 
@@ -138,14 +138,21 @@ impl Scene {
 
     /// Probability that [`pick_light`](Self::pick_light) chooses `id` at `p`.
     #[inline]
-    pub fn light_probability(&self, p: DVec3, id: LightId) -> f64 {
-        self.choose_light.probability(&self.lights, p, id.index())
+    pub fn light_probability(&self, p: DVec3, seen: Option<&[f32]>, id: LightId) -> f64 {
+        let lights = &self.lights;
+        self.choose_light.probability(lights, p, seen, id.index())
     }
 
     /// Chooses a light for a shading point by `u`: which, its probability, and `u` rescaled.
+    /// `seen` is the share of each light that points around there see, as far as known.
     #[inline]
-    pub fn pick_light(&self, p: DVec3, u: f64) -> Option<(LightId, f64, f64)> {
-        let (i, pdf, rest) = self.choose_light.sample(&self.lights, p, u)?;
+    pub fn pick_light(
+        &self,
+        p: DVec3,
+        seen: Option<&[f32]>,
+        u: f64,
+    ) -> Option<(LightId, f64, f64)> {
+        let (i, pdf, rest) = self.choose_light.sample(&self.lights, p, seen, u)?;
         Some((LightId(i as u32), pdf, rest))
     }
 
