@@ -75,6 +75,17 @@ pub enum Units {
     Radiometric,
 }
 
+/// Which glass without a volume is solid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Solid {
+    /// In files of Blender's exporter, on closed meshes
+    Auto,
+    /// All
+    Always,
+    /// None: thin walls, as glTF says
+    Never,
+}
+
 /// Which scene, and how it is read.
 #[derive(Clone, Debug, Args)]
 pub struct SceneArgs {
@@ -84,6 +95,9 @@ pub struct SceneArgs {
     /// What the numbers of the file's lights mean
     #[arg(long, value_enum, default_value = "auto", hide_possible_values = false)]
     pub light_units: Units,
+    /// Which glass without KHR_materials_volume is solid
+    #[arg(long, value_enum, default_value = "auto", hide_possible_values = false)]
+    pub solid_glass: Solid,
     /// Light from all around: an image of the sky (.hdr, .exr) or a colour R,G,B; replaces the file's
     #[arg(long, value_name = "FILE|R,G,B")]
     pub environment: Option<values::Sky>,

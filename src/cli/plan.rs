@@ -4,10 +4,10 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::args::{RenderArgs, SceneArgs, Units};
+use super::args::{RenderArgs, SceneArgs, Solid, Units};
 use super::values::{Size, Sky};
 use crate::error::{Error, Result};
-use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits};
+use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits, SolidGlass};
 use crate::integrators::IntegratorSettings;
 use crate::output::{self, OutputSettings};
 use crate::pipeline::{PixelSampling, Progressive, RenderSettings};
@@ -198,6 +198,11 @@ pub fn import_options(args: &SceneArgs) -> ImportOptions {
             Units::Blender => LightUnits::Blender,
             Units::Photometric => LightUnits::Photometric,
             Units::Radiometric => LightUnits::Radiometric,
+        },
+        solid_glass: match args.solid_glass {
+            Solid::Auto => SolidGlass::Auto,
+            Solid::Always => SolidGlass::Always,
+            Solid::Never => SolidGlass::Never,
         },
         scene: args.name.clone(),
         time: args

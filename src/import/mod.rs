@@ -30,6 +30,7 @@ mod morph;
 mod node;
 mod schema;
 mod skin;
+mod solid;
 mod tangents;
 mod texture;
 mod used;
@@ -37,7 +38,7 @@ mod variants;
 mod vertices;
 mod views;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 pub use crate::color::units::LightUnits;
@@ -51,12 +52,15 @@ use image::Images;
 pub use inventory::{AnimationInfo, Extensions, ImageInfo, Inventory, MaterialInfo, inventory};
 use json::Cursor;
 use node::Walker;
+pub use solid::SolidGlass;
 
 /// How a file is to be read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportOptions {
     /// In which units the intensities of punctual lights are given.
     pub light_units: LightUnits,
+    /// Which glass without a volume is taken for solid.
+    pub solid_glass: SolidGlass,
     /// Name of the scene; `None` for the file's default.
     pub scene: Option<String>,
     /// The moment at which animations are shown, in seconds; `None` for the rest pose.
@@ -287,6 +291,12 @@ fn fill<'a>(
     }
     images.decode()?;
     let mut materials = Vec::new();
+    let mut solid = HashMap::new();
+    let takes_solid = match options.solid_glass {
+        SolidGlass::Auto => light::from_blender(root),
+        SolidGlass::Always => true,
+        SolidGlass::Never => false,
+    };
     let colored = material::with_vertex_colors(root)?;
     for (i, m) in entries.iter().enumerate() {
         let mut desc = material::read(m, images, notes)?;
@@ -295,6 +305,12 @@ fn fill<'a>(
             .add_material(&desc)
             .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
         materials.push(id);
+        if let Some(twin) = solid::twin(&desc).filter(|_| takes_solid) {
+            let twin = builder
+                .add_material(&twin)
+                .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
+            solid.insert(id, twin);
+        }
     }
     let default_material = builder
         .add_material(&MaterialDesc {
@@ -317,11 +333,21 @@ fn fill<'a>(
         variant,
         hierarchy: Hierarchy::new(root.clone(), &pose),
         materials: &materials,
+        solid: &solid,
+        open_too: options.solid_glass == SolidGlass::Always,
+        made_solid: 0,
         default_material,
         builder,
         notes,
     };
     walker.walk(&roots)?;
+    let made_solid = walker.made_solid;
+    if made_solid > 0 {
+        builder.inform(format!(
+            "{made_solid} object(s) of glass without a volume are taken for solid; \
+             --solid-glass never takes them for thin walls"
+        ));
+    }
     Ok(environment::of_scene(&scene, path, notes)?)
 }
 

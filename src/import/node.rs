@@ -1,6 +1,6 @@
 //! Nodes: lights, cameras and meshes where they stand. Meshes are read in parallel, each once.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -9,7 +9,9 @@ use super::hierarchy::Hierarchy;
 use super::json::Cursor;
 use super::mesh::{Part, Shaping};
 use super::skin::Skin;
-use super::{Notes, Problem, camera, implicit, instancing, light, mesh, morph, tangents, variants};
+use super::{
+    Notes, Problem, camera, implicit, instancing, light, mesh, morph, solid, tangents, variants,
+};
 use crate::color::units::LightUnits;
 use crate::geometry::{MaterialId, ShapeId};
 use crate::math::DAffine3;
@@ -25,6 +27,12 @@ pub(super) struct Walker<'a, 'b> {
     pub(super) hierarchy: Hierarchy<'a, 'b>,
     pub(super) materials: &'b [MaterialId],
     pub(super) default_material: MaterialId,
+    /// Solid twins of glass without a volume.
+    pub(super) solid: &'b HashMap<MaterialId, MaterialId>,
+    /// Whether they are taken on open meshes, too.
+    pub(super) open_too: bool,
+    /// Objects that were placed with one.
+    pub(super) made_solid: usize,
     pub(super) builder: &'b mut SceneBuilder,
     pub(super) notes: &'b mut Notes,
 }
@@ -46,6 +54,13 @@ struct Posed<'a> {
     skin: Option<Skin>,
     /// Indices of its primitives among the jobs, with their materials.
     parts: Vec<(usize, MaterialId)>,
+}
+
+/// A shape, and whether glass of this shape can be solid.
+#[derive(Clone, Copy)]
+struct Made {
+    shape: ShapeId,
+    solid: bool,
 }
 
 /// A mesh that is to be placed.
@@ -256,7 +271,10 @@ impl<'a> Walker<'a, '_> {
         &mut self,
         jobs: &[Job<'a>],
         posed: &[Posed<'a>],
-    ) -> Result<Vec<Option<ShapeId>>, Problem> {
+    ) -> Result<Vec<Option<Made>>, Problem> {
+        let parts = posed.iter().flat_map(|p| &p.parts);
+        let glass = parts.filter(|(_, m)| !self.open_too && self.solid.contains_key(m));
+        let asked: HashSet<usize> = glass.map(|&(job, _)| job).collect();
         let source = self.source;
         let done: Vec<_> = jobs
             .par_iter()
@@ -267,34 +285,53 @@ impl<'a> Walker<'a, '_> {
             })
             .collect();
         let mut shapes = Vec::new();
-        for ((part, notes), job) in done.into_iter().zip(jobs) {
+        for (i, ((part, notes), job)) in done.into_iter().zip(jobs).enumerate() {
             self.notes.join(notes);
             shapes.push(part?.map(|p| match p {
-                Part::Mesh(m) => self.builder.add_mesh(m, &job.name),
-                Part::Spheres(s) => self.builder.add_spheres(s, &job.name),
+                Part::Mesh(m) => Made {
+                    solid: self.open_too || (asked.contains(&i) && solid::is_closed(&m)),
+                    shape: self.builder.add_mesh(m, &job.name),
+                },
+                Part::Spheres(s) => Made {
+                    solid: true,
+                    shape: self.builder.add_spheres(s, &job.name),
+                },
             }));
         }
         Ok(shapes)
     }
 
-    fn place_all(&mut self, u: &Use, posed: &Posed<'a>, shapes: &[Option<ShapeId>]) {
+    fn place_all(&mut self, u: &Use, posed: &Posed<'a>, shapes: &[Option<Made>]) {
         // The transform of a skinned mesh's node does not count (glTF 2.0, 3.7.3.3).
         let skinned = posed.skin.as_ref();
         let skinned = skinned.map(|s| vec![DAffine3::from_translation(s.center)]);
         let worlds = skinned.as_ref().unwrap_or(&u.worlds);
         if let Some(shape) = u.sphere {
             let material = posed.parts.first().map_or(self.default_material, |p| p.1);
+            let material = self.solid_or(material, true);
             for world in &u.worlds {
                 self.place(shape, material, *world, u.name.clone());
             }
             return;
         }
         for &(job, material) in &posed.parts {
-            if let Some(shape) = shapes[job] {
+            if let Some(Made { shape, solid }) = shapes[job] {
+                let material = self.solid_or(material, solid);
                 for world in worlds {
                     self.place(shape, material, *world, u.name.clone());
                 }
             }
+        }
+    }
+
+    /// The material of a shape, or its solid twin where the shape can be solid.
+    fn solid_or(&mut self, material: MaterialId, solid: bool) -> MaterialId {
+        match self.solid.get(&material) {
+            Some(&twin) if solid => {
+                self.made_solid += 1;
+                twin
+            }
+            _ => material,
         }
     }
 
