@@ -85,7 +85,8 @@ impl Clearing {
     #[inline]
     fn contains(&self, q: DVec2) -> bool {
         let [a, b] = self.corners(sector(q));
-        (b - a).perp_dot(q - a) >= 0.0
+        // Strictly: a sector of no reach holds nothing, not everything.
+        (b - a).perp_dot(q - a) > 0.0
     }
 
     /// Area of the disc around `center`, relative to the site, that lies inside.
@@ -289,6 +290,21 @@ mod tests {
             }
             assert!([k, (k + 15) % 16].contains(&sector(COMPASS[k])), "{k}");
         }
+    }
+
+    #[test]
+    fn a_sector_of_no_reach_holds_nothing() {
+        let mut nook = regular(0.0);
+        nook.sectors[3] = [2.0, 1.0];
+        let inside = |angle: f64, r: f64| nook.contains(DVec2::from_angle(angle * TAU / 16.0) * r);
+        for k in 0..DIRECTIONS {
+            let middle = k as f64 + 0.5;
+            for r in [1e-6, 1.0, 100.0] {
+                assert_eq!(inside(middle, r), k == 3 && r < 1.3, "{k} {r}");
+            }
+        }
+        let area = nook.disc(DVec2::ZERO, 9.0);
+        assert!((area - (TAU / 16.0).sin()).abs() < 1e-6, "{area}");
     }
 
     #[test]
