@@ -342,7 +342,8 @@ fn raw_hit(RayHit { ray, hit }: &RayHit) -> Option<RawHit> {
 fn is_ray(org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> bool {
     let all = [org[0], org[1], org[2], dir[0], dir[1], dir[2]];
     // A sum is only finite if all its terms are; if it is not, it may have overflowed.
-    let finite = all.iter().sum::<f32>().abs() < f32::INFINITY || all.iter().all(|x| x.is_finite());
+    let sum = (all[0] + all[1]) + (all[2] + all[3]) + (all[4] + all[5]);
+    let finite = sum.abs() < f32::INFINITY || all.iter().all(|x| x.is_finite());
     // Comparisons with what is not a number are false.
     finite && dir != [0.0; 3] && 0.0 <= tnear && tnear <= tfar && tnear < f32::INFINITY
 }

@@ -1,5 +1,6 @@
 //! Indexed triangle meshes.
 
+use super::facet::Facet;
 use crate::math::{Aabb, DVec3, Vec3};
 
 /// How many primitives were dropped, and why.
@@ -38,7 +39,13 @@ pub struct TriangleMesh {
     pub colors: Vec<[f32; 4]>,
     /// Tangents per vertex along growing `u`, with the sign of the bitangent; may be empty.
     pub tangents: Vec<[f32; 4]>,
+    /// The triangles prepared for refinement, all of them or none.
+    pub facets: Vec<Facet>,
 }
+
+/// Meshes of up to so many triangles are prepared for refinement: walls, floors and furniture,
+/// which most rays hit, in half a megabyte. The large ones stay small in memory.
+const PREPARED: usize = 4096;
 
 impl TriangleMesh {
     /// Drops triangles that no backend can hold or that have no area, and says how many.
@@ -64,6 +71,23 @@ impl TriangleMesh {
             true
         });
         dropped
+    }
+
+    /// Prepares the triangles for refinement, if they are few. Corners must not change afterwards.
+    pub fn prepare(&mut self) {
+        if self.indices.len() <= PREPARED {
+            let all = 0..self.indices.len() as u32;
+            self.facets = all.map(|i| Facet::new(self.corners(i))).collect();
+        }
+    }
+
+    /// Triangle `prim` as refinement needs it.
+    #[inline(always)]
+    pub fn facet(&self, prim: u32) -> Facet {
+        match self.facets.get(prim as usize) {
+            Some(facet) => *facet,
+            None => Facet::new(self.corners(prim)),
+        }
     }
 
     /// Corner positions of triangle `prim`.

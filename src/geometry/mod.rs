@@ -6,6 +6,7 @@
 
 mod coverage;
 mod differential;
+mod facet;
 pub mod forecast;
 mod hit;
 mod mesh;

@@ -3,7 +3,7 @@
 use super::object::Placement;
 use super::{Hit, Object, Ray, Shape, SphereSet, TriangleMesh, sphere, triangle};
 use crate::ad::V3;
-use crate::math::{DVec3, larger, max_abs, robust};
+use crate::math::{DVec3, larger, max_abs, nearly_unit, robust};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -73,7 +73,7 @@ impl SurfacePoint {
             (None, Shape::Spheres(set)) => on_sphere(o, d, &near, hit.prim, set),
             (Some(place), _) => on_placed(o, d, &near, hit.prim, shape, place),
         };
-        let (unit, length) = unit_and_length(d);
+        let (unit, length) = nearly_unit(d);
         let wo = -unit;
         Self {
             p: on.p,
@@ -139,19 +139,6 @@ impl SurfacePoint {
     }
 }
 
-/// `d` normalised, and its length. Directions that are unit up to their rounding to single
-/// precision, as nearly all are, need no square root: one Newton step leaves an error of 1e-13.
-#[inline]
-fn unit_and_length(d: DVec3) -> (DVec3, f64) {
-    let dd = d.dot(d);
-    let inv = if (dd - 1.0).abs() < 5e-7 {
-        1.5 - 0.5 * dd
-    } else {
-        1.0 / dd.sqrt()
-    };
-    (d * inv, dd * inv)
-}
-
 /// What a backend says of the distance.
 struct Near {
     /// The distance, with the backend's rounding.
@@ -175,14 +162,11 @@ struct Refined {
 
 #[inline(always)]
 fn on_triangle(o: DVec3, d: DVec3, near: &Near, prim: u32, mesh: &TriangleMesh) -> Refined {
-    let v = mesh.corners(prim);
-    // A backend may report a hit an ulp outside, or on a triangle seen edge-on:
-    // the point is kept on the triangle.
-    let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
-    let normal = e1.cross(e2);
-    let n2 = normal.length_squared();
+    let f = mesh.facet(prim);
     let (o, d) = (V3::<f64>::constant(o), V3::constant(d));
-    let (t, b1, b2) = match triangle::plane_hit(o, d, v[0], e1, e2, normal) {
+    let (t, b1, b2) = match triangle::plane_hit(o, d, f.v0, f.e1, f.e2, f.normal) {
+        // A backend may report a hit an ulp outside, or on a triangle seen edge-on: the point is
+        // kept on the triangle.
         Some(h) => {
             let (b1, b2) = clamp_barycentrics(h.b1, h.b2);
             (h.t, b1, b2)
@@ -191,13 +175,12 @@ fn on_triangle(o: DVec3, d: DVec3, near: &Near, prim: u32, mesh: &TriangleMesh) 
     };
     Refined {
         t,
-        p: v[0] + e1 * b1 + e2 * b2,
-        // One over the length, in which the division does not wait for the root.
-        ng: normal * (n2.sqrt() * (1.0 / n2)),
+        p: f.v0 + f.e1 * b1 + f.e2 * b2,
+        ng: f.ng,
         smooth: mesh.normal(prim, b1, b2).and_then(DVec3::try_normalize),
         barycentrics: [b1, b2],
-        // A backend's rounding grows with the corners, which can be far from the point.
-        reach: larger(larger(max_abs(v[0]), max_abs(v[1])), max_abs(v[2])),
+        // Corners can be far from the point.
+        reach: f.reach,
     }
 }
 
@@ -218,7 +201,9 @@ fn on_sphere(o: DVec3, d: DVec3, near: &Near, prim: u32, set: &SphereSet) -> Ref
         // The backend saw a graze that exact arithmetic misses: the closest point serves.
         None => line.t_closest,
     };
-    let n = (o + d * t - c).try_normalize().unwrap_or(DVec3::Z);
+    // As good as unit already where the point was computed well, which spares a root to wait for.
+    let (n, length) = nearly_unit((o + d * t - c) * (1.0 / r));
+    let n = if length > 0.0 { n } else { DVec3::Z };
     Refined {
         t,
         p: c + n * r,

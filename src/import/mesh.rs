@@ -100,6 +100,7 @@ pub(super) fn read<'a>(
         uv_sets: vertices.uv_sets,
         colors: vertices.colors,
         tangents: vertices.tangents,
+        ..TriangleMesh::default()
     })))
 }
 

@@ -47,6 +47,7 @@ pub(super) struct View<'a> {
 
 impl View<'_> {
     /// Sample `number` of a pixel, to be added to sum `sum`.
+    #[inline(always)]
     pub(super) fn sample(&self, [px, py]: [u32; 2], number: u32, sum: usize) -> Sample {
         let key = u64::from(py) * u64::from(self.width) + u64::from(px);
         let mut sampler = Sampler::new(self.seed, stream::CAMERA, key, u64::from(number));

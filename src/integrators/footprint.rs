@@ -32,6 +32,7 @@ impl Spacing {
     /// The camera's ray through the image point `(x, y)` in pixels, with its differential. It is
     /// the difference of the rays half a pixel to either side, so that any camera will do; a
     /// camera maps pixels so smoothly that nothing is lost.
+    #[inline]
     pub fn camera_ray(
         &self,
         camera: &dyn Camera,
@@ -87,13 +88,15 @@ impl Trail {
         ray: &Ray,
         sp: &SurfacePoint,
     ) -> Self {
-        Self {
-            landing: match differential {
-                None => None,
-                Some(d) => d.land(&scene.geometry, ray, sp),
-            },
+        let mut trail = Self {
+            landing: None,
             crossing: scene.crossing(inside, sp),
+        };
+        // In place: it is large, and to move nothing of it costs as much as to move it.
+        if let Some(d) = differential {
+            trail.landing = d.land(&scene.geometry, ray, sp);
         }
+        trail
     }
 
     /// The media that the surface parts.

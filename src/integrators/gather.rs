@@ -11,7 +11,7 @@ use super::stored_light::{Stored, sites};
 use crate::color::Rgb;
 use crate::effects::EffectSet;
 use crate::geometry::{Footprint, Ray, SurfacePoint};
-use crate::materials::{Bsdf, TransportMode};
+use crate::materials::{Bsdf, Scattering, TransportMode};
 use crate::photons::PhotonClass;
 use crate::sampling::Sampler;
 
@@ -193,6 +193,9 @@ impl PhotonMapping<'_> {
             if depth == 0 && sp.light.is_some() {
                 on_light(Seen::Light(&sp, trail.footprint()), beta);
             }
+            if let Some(matte) = cx.scene.matte(&sp) {
+                return beta * self.reflected(&sp, &trail, &matte, sampler, scratch, steps);
+            }
             let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
             cx.scene.scatter(&sp, trail.footprint(), &mut bsdf);
             trail.crossing().apply(&mut bsdf);
@@ -238,7 +241,7 @@ impl PhotonMapping<'_> {
         &self,
         sp: &SurfacePoint,
         trail: &Trail,
-        bsdf: &Bsdf,
+        bsdf: &impl Scattering,
         sampler: &mut Sampler,
         scratch: &mut Scratch,
         steps: u32,

@@ -3,7 +3,7 @@
 use super::RenderContext;
 use crate::color::Rgb;
 use crate::geometry::{LightId, Ray, SurfacePoint};
-use crate::materials::{Bsdf, BsdfValue};
+use crate::materials::{BsdfValue, Scattering};
 use crate::math::DVec3;
 
 /// The power heuristic with exponent 2 (Veach 1997, 9.2.4) for `na` samples of density `a`
@@ -111,14 +111,13 @@ pub(super) struct DirectSample {
 pub(super) fn sample_direct(
     cx: &RenderContext<'_>,
     sp: &SurfacePoint,
-    bsdf: &Bsdf,
+    bsdf: &impl Scattering,
     u: [f64; 2],
     n_light: f64,
     n_bsdf: f64,
 ) -> Option<DirectSample> {
     let (id, p_pick, rest) = cx.pick_light(sp.p, u[0])?;
-    let light = cx.scene.light(id);
-    let li = light.sample_li(sp.p, [rest, u[1]])?;
+    let li = cx.scene.sample_li(id, sp.p, [rest, u[1]])?;
     let pdf = li.pdf * p_pick;
     let x = pdf * n_light;
     let alone = li.delta || n_bsdf == 0.0;

@@ -11,7 +11,7 @@ use super::{BATCH, Integrator, IntegratorEntry, RenderContext, Sample, Scratch};
 use crate::color::Rgb;
 use crate::film::{Component, PixelSample};
 use crate::geometry::{Differential, Ray, SurfacePoint};
-use crate::materials::{Bsdf, BsdfValue, LobeClass, TransportMode};
+use crate::materials::{Bsdf, BsdfValue, LobeClass, Scattering, TransportMode};
 use crate::math::DVec3;
 use crate::sampling::Sampler;
 use crate::scene::{Inside, Scene};
@@ -208,6 +208,12 @@ impl Path<'_> {
                 out.add(w.walk.component(), w.beta * le * weight);
             }
         }
+        if let Some(matte) = cx.scene.matte(sp) {
+            if depth == 0 {
+                out.albedo += matte.reflected_albedo();
+            }
+            return self.turn(depth, w, sp, &trail, &matte, lights);
+        }
         let mut bsdf = Bsdf::new(sp, TransportMode::Radiance);
         cx.scene.scatter(sp, trail.footprint(), &mut bsdf);
         trail.crossing().apply(&mut bsdf);
@@ -220,12 +226,28 @@ impl Path<'_> {
             }
             return false;
         }
+        self.turn(depth, w, sp, &trail, &bsdf, lights)
+    }
+
+    /// Asks for light from elsewhere, and turns the path into a new direction. Whether it goes
+    /// on.
+    #[inline(always)]
+    fn turn(
+        &self,
+        depth: u32,
+        w: &mut Walker,
+        sp: &SurfacePoint,
+        trail: &Trail,
+        bsdf: &impl Scattering,
+        lights: &mut ArrayVec<Direct, BATCH>,
+    ) -> bool {
+        let cx = &self.cx;
         if depth >= cx.settings.max_depth.unwrap_or(DEPTH_GUARD) {
             return false;
         }
         if bsdf.has_finite() {
             let u = w.sampler.next_2d();
-            if let Some(direct) = sample_direct(cx, sp, &bsdf, u, 1.0, 1.0) {
+            if let Some(direct) = sample_direct(cx, sp, bsdf, u, 1.0, 1.0) {
                 lights.push(Direct {
                     ray: direct.ray,
                     value: direct.value * w.beta,

@@ -7,13 +7,13 @@ use arrayvec::ArrayVec;
 use super::{RenderContext, Scratch};
 use crate::color::Rgb;
 use crate::geometry::SurfacePoint;
-use crate::materials::Bsdf;
+use crate::materials::Scattering;
 use crate::photons::map::{Estimate, IrradianceSample, PhotonMap, Site, Surroundings};
 use crate::photons::{PhotonClass, PhotonMaps};
 
 /// Where photons count at a surface: on the side that is seen, and on the other one too if
 /// diffuse light comes through. The first is the side that is seen.
-pub(super) fn sites(sp: &SurfacePoint, bsdf: &Bsdf) -> ArrayVec<Site, 2> {
+pub(super) fn sites(sp: &SurfacePoint, bsdf: &impl Scattering) -> ArrayVec<Site, 2> {
     let ng = if sp.front { sp.ng } else { -sp.ng };
     let mut out = ArrayVec::new();
     out.push(Site::new(sp.p, ng));
@@ -47,7 +47,7 @@ impl Stored<'_> {
         &self,
         map: &PhotonMap,
         sites: &[Site],
-        bsdf: &Bsdf,
+        bsdf: &impl Scattering,
         keep: impl Fn(PhotonClass) -> bool,
         scratch: &mut Scratch,
     ) -> Estimate {
@@ -69,7 +69,12 @@ impl Stored<'_> {
 
     /// Radiance that diffuse lobes which are not Lambert's send back, from all photons but
     /// caustic ones.
-    pub(super) fn reflected(&self, sites: &[Site], bsdf: &Bsdf, scratch: &mut Scratch) -> Rgb {
+    pub(super) fn reflected(
+        &self,
+        sites: &[Site],
+        bsdf: &impl Scattering,
+        scratch: &mut Scratch,
+    ) -> Rgb {
         let Some(map) = &self.maps.global else {
             return Rgb::ZERO;
         };
@@ -79,7 +84,7 @@ impl Stored<'_> {
 
     /// Radiance sent back of the light that caustics on other surfaces shed here. Diffuse lobes
     /// that are not Lambert's are taken by their albedo: this light comes from all around.
-    pub(super) fn glow(&self, sites: &[Site], bsdf: &Bsdf) -> Rgb {
+    pub(super) fn glow(&self, sites: &[Site], bsdf: &impl Scattering) -> Rgb {
         let Some(map) = &self.maps.glow else {
             return Rgb::ZERO;
         };

@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use super::facets::{FEWEST, Facet, Facets};
+use super::parallelogram::{Face, Parallelogram};
 use super::{
     EmissionMap, EmissionOrigin, LiSample, Light, LightDesc, LightEntry, surface_importance,
 };
@@ -26,6 +27,9 @@ struct AreaLight {
     triangles: Vec<Triangle>,
     /// In proportion to area, or to flux where a map varies it.
     choose: Discrete,
+    /// The two triangles in one, if they are the halves of a parallelogram of even radiance: the
+    /// commonest lamp, whose points need no choice and are stratified as a whole.
+    panel: Option<Parallelogram>,
     /// For the light that arrives at a point, if there are many.
     facets: Option<Facets>,
     areas: Vec<f64>,
@@ -57,14 +61,13 @@ struct Point<'a> {
 
 impl AreaLight {
     /// A random point.
-    #[inline(always)]
+    #[inline]
     fn point(&self, u: [f64; 2]) -> Option<Point<'_>> {
         let (i, _, rest) = self.choose.sample(u[0])?;
         Some(self.point_on(i, self.pdf_area(i), [rest, u[1]]))
     }
 
     /// A random point for the light that arrives at `p`.
-    #[inline(always)]
     fn point_for(&self, p: DVec3, u: [f64; 2]) -> Option<Point<'_>> {
         let Some(facets) = &self.facets else {
             return self.point(u);
@@ -74,7 +77,7 @@ impl AreaLight {
     }
 
     /// A random point of triangle `i`; `pdf_area` is what makes its density.
-    #[inline(always)]
+    #[inline]
     fn point_on(&self, i: usize, pdf_area: f64, u: [f64; 2]) -> Point<'_> {
         let triangle = &self.triangles[i];
         let b = warp::triangle(u);
@@ -110,29 +113,23 @@ impl Light for AreaLight {
         surface_importance(self.flux, &self.around, p)
     }
 
-    #[inline]
     fn sample_li(&self, p: DVec3, u: [f64; 2]) -> Option<LiSample> {
+        if let Some(panel) = &self.panel {
+            return panel.sample_li(p, u);
+        }
         let on = self.point_for(p, u)?;
-        let to = on.p - p;
-        let d2 = to.length_squared();
-        if !(d2 >= f64::MIN_POSITIVE) {
-            return None;
-        }
-        let (d, ng) = (d2.sqrt(), on.triangle.ng);
-        // The division does not wait for the root,
-        let wi = to * (d * (1.0 / d2));
-        // nor does the cosine times the distance.
-        let cos = -to.dot(ng);
-        if cos == 0.0 || (cos < 0.0 && !self.double_sided) {
-            return None;
-        }
-        Some(LiSample {
-            wi,
-            target: Some(on.p + ng * on.triangle.offset.copysign(cos)),
+        let face = Face {
+            ng: on.triangle.ng,
+            offset: on.triangle.offset,
             radiance: on.radiance,
-            pdf: d * (d2 * on.pdf_area / cos.abs()),
-            delta: false,
-        })
+            pdf_area: on.pdf_area,
+            double_sided: self.double_sided,
+        };
+        face.li(p, on.p)
+    }
+
+    fn parallelogram(&self) -> Option<Parallelogram> {
+        self.panel
     }
 
     #[inline]
@@ -226,6 +223,24 @@ fn means(map: &EmissionMap, triangles: usize) -> Vec<Rgb> {
         .collect()
 }
 
+/// The parallelogram that two triangles with a common edge make, if they do up to a fraction of
+/// the offset of shadow rays: its first corner and its edges.
+fn parallelogram(triangles: &[Triangle], corners: &[[DVec3; 3]]) -> Option<[DVec3; 3]> {
+    let ([a, b], [p, q]) = (triangles, corners) else {
+        return None;
+    };
+    let slack = 0.25 * a.offset.min(b.offset);
+    let near = |x: DVec3, y: DVec3| (x - y).length() <= slack;
+    (0..3).find_map(|i| {
+        // The edge that the halves share lies opposite corner `i`.
+        let (v0, v1, v2) = (p[i], p[(i + 1) % 3], p[(i + 2) % 3]);
+        let shared = |c: &&DVec3| near(**c, v1) || near(**c, v2);
+        let far = q.iter().find(|c| !shared(c))?;
+        let whole = q.iter().filter(shared).count() == 2 && near(*far, v1 + v2 - v0);
+        (whole && a.ng.dot(b.ng) > 0.0).then(|| [v0, v1 - v0, v2 - v0])
+    })
+}
+
 fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
     let mut areas = Vec::with_capacity(d.triangles.len());
     let triangles: Vec<Triangle> = d
@@ -292,6 +307,20 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
         let facets: Vec<Facet> = d.triangles.iter().enumerate().map(facet).collect();
         Facets::new(&facets, d.double_sided)
     });
+    let panel = parallelogram(&triangles, &d.triangles)
+        .filter(|_| map.is_none())
+        .map(|[v0, e1, e2]| Parallelogram {
+            v0,
+            e1,
+            e2,
+            face: Face {
+                ng: triangles[0].ng,
+                offset: triangles[0].offset.max(triangles[1].offset),
+                radiance: d.strength,
+                pdf_area: 1.0 / area,
+                double_sided: d.double_sided,
+            },
+        });
     let mut around = Aabb::EMPTY;
     for p in d.triangles.iter().flatten() {
         around.grow(*p);
@@ -304,6 +333,7 @@ fn build(d: &LightDesc) -> Result<Box<dyn Light>, String> {
         double_sided: d.double_sided,
         triangles,
         choose,
+        panel,
         facets,
         areas,
         area,
@@ -318,3 +348,55 @@ pub(super) const ENTRY: LightEntry = LightEntry {
     doc: "emissive triangles, uniform over their area, with cosine emission",
     build,
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn light(triangles: [[DVec3; 3]; 2]) -> Box<dyn Light> {
+        let built = build(&LightDesc {
+            strength: Rgb::ONE,
+            triangles: triangles.to_vec(),
+            ..LightDesc::default()
+        });
+        built.expect("an area")
+    }
+
+    #[test]
+    fn two_halves_of_a_parallelogram_are_one_however_they_are_listed() {
+        let (o, e1, e2) = (
+            DVec3::new(1.0, 2.0, 3.0),
+            DVec3::new(0.5, 0.1, 0.0),
+            DVec3::new(0.2, 0.0, 0.7),
+        );
+        let [a, b, c, d] = [o, o + e1, o + e1 + e2, o + e2];
+        let turned = |t: [DVec3; 3], by: usize| [t[by % 3], t[(by + 1) % 3], t[(by + 2) % 3]];
+        for k in 0..9 {
+            let whole = light([turned([a, b, c], k % 3), turned([a, c, d], k / 3)]);
+            let q = whole.parallelogram().expect("a parallelogram");
+            // The same density as the surface has, and points all over it.
+            let from = DVec3::new(1.3, 3.0, 3.2);
+            let mut mean = DVec3::ZERO;
+            for i in 0..64 {
+                let u = [
+                    (f64::from(i % 8) + 0.5) / 8.0,
+                    (f64::from(i / 8) + 0.5) / 8.0,
+                ];
+                let seen = from + DVec3::Y * if q.face.ng.y > 0.0 { 0.0 } else { -3.0 };
+                let s = whole.sample_li(seen, u).expect("in front");
+                let on = s.target.expect("near") - q.face.ng * q.face.offset;
+                let cos = s.wi.dot(q.face.ng).abs();
+                let pdf = (on - seen).length_squared() / (cos * e1.cross(e2).length());
+                assert!((s.pdf / pdf - 1.0).abs() < 1e-6);
+                mean += on / 64.0;
+            }
+            assert!((mean - (o + (e1 + e2) * 0.5)).length() < 1e-6);
+        }
+        // A kite, two that are folded, and two that face apart are none.
+        let far = c + e2 * 0.01;
+        assert!(light([[a, b, far], [a, far, d]]).parallelogram().is_none());
+        let up = c + e1.cross(e2) * 1e-3;
+        assert!(light([[a, b, up], [a, up, d]]).parallelogram().is_none());
+        assert!(light([[a, b, c], [a, d, c]]).parallelogram().is_none());
+    }
+}

@@ -12,12 +12,14 @@ mod ellipsoid;
 mod environment;
 mod facets;
 mod panel;
+mod parallelogram;
 mod point;
 mod sky;
 mod sphere;
 mod spot;
 
 pub use desc::{EmissionMap, LightDesc, SpotCurve};
+pub use parallelogram::Parallelogram;
 pub use sky::SkyImage;
 
 use crate::color::Rgb;
@@ -94,6 +96,12 @@ pub trait Light: Send + Sync {
 
     /// Samples the light that arrives at `p`; `None` where none can.
     fn sample_li(&self, p: DVec3, u: [f64; 2]) -> Option<LiSample>;
+
+    /// The light itself, if it is a parallelogram of even radiance: whoever samples it often
+    /// then need not ask this trait.
+    fn parallelogram(&self) -> Option<Parallelogram> {
+        None
+    }
 
     /// Density in solid angle, seen from `p`, with which [`sample_li`](Self::sample_li) finds
     /// the point `on` of this light; 0 for delta lights.

@@ -32,10 +32,13 @@ pub fn dielectric(cos_i: f64, eta: f64) -> Dielectric {
     }
     let ct = (1.0 - sin2_t).sqrt();
     let (s_sum, p_sum) = (ci + eta * ct, eta * ci + ct);
-    let rs = (ci - eta * ct) / s_sum;
-    let rp = (eta * ci - ct) / p_sum;
+    // Both reciprocals by one division.
+    let inv = 1.0 / (s_sum * p_sum);
+    let (s_inv, p_inv) = (p_sum * inv, s_sum * inv);
+    let rs = (ci - eta * ct) * s_inv;
+    let rp = (eta * ci - ct) * p_inv;
     // T = ½ (4 η ci ct)(1/s² + 1/p²): no difference of nearly equal numbers.
-    let t = 2.0 * eta * ci * ct * (1.0 / (s_sum * s_sum) + 1.0 / (p_sum * p_sum));
+    let t = 2.0 * eta * ci * ct * (s_inv * s_inv + p_inv * p_inv);
     Dielectric {
         reflectance: 0.5 * (rs * rs + rp * rp),
         transmittance: t,

@@ -18,6 +18,10 @@ impl Material for LambertMaterial {
         });
     }
 
+    fn matte(&self) -> Option<Rgb> {
+        (!self.albedo.is_black()).then_some(self.albedo)
+    }
+
     fn traits(&self) -> MaterialTraits {
         MaterialTraits {
             diffuse: self.albedo.max_channel(),

@@ -26,12 +26,13 @@ mod mirror;
 mod pbr;
 mod unlit;
 
-pub use bsdf::{Bsdf, BsdfSample, BsdfValue, FrameId, TransportMode};
+pub use bsdf::{Bsdf, BsdfSample, BsdfValue, FrameId, Matte, Scattering, TransportMode};
 pub use desc::{AlphaMode, Interior, MaterialDesc, MaterialTraits, Medium};
 pub use lobes::{CustomLobe, Lobe, LobeClass, LobeModel, LobeSample};
 pub use slots::TextureSlots;
 pub use thin_film::ThinFilm;
 
+use crate::color::Rgb;
 use crate::geometry::Surface;
 
 /// What a surface is made of.
@@ -49,6 +50,12 @@ pub trait Material: Send + Sync {
     /// What it can do at all; the survey of effects relies on it, so it may promise too much
     /// but never too little.
     fn traits(&self) -> MaterialTraits;
+
+    /// The reflectance, if all that it ever pushes is one Lambert lobe, the same everywhere:
+    /// its points are then shaded as [`Matte`].
+    fn matte(&self) -> Option<Rgb> {
+        None
+    }
 
     /// The medium behind its front face, if it encloses one that absorbs.
     fn interior(&self) -> Option<Interior> {

@@ -99,6 +99,11 @@ pub(super) fn bake(
             name: Arc::from(p.name),
         });
     }
+    for shape in &mut geometry.shapes {
+        if let Shape::Mesh(mesh) = shape {
+            mesh.prepare();
+        }
+    }
     geometry
 }
 

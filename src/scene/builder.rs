@@ -222,17 +222,20 @@ impl SceneBuilder {
                 geometry.object(*first).name
             ));
         }
-        let (mut materials, mut material_names) = (Vec::new(), Vec::new());
+        let (mut materials, mut material_names) = (Vec::<Box<dyn Material>>::new(), Vec::new());
         for (m, name, ..) in self.materials {
             materials.push(m);
             material_names.push(name);
         }
+        let matte = materials.iter().map(|m| m.matte()).collect();
         Ok(Scene {
             choose_light: LightChoice::new(&lights),
             geometry: Arc::new(geometry),
             materials,
+            matte,
             material_names,
             textures: self.textures,
+            parallelograms: lights.iter().map(|l| l.parallelogram()).collect(),
             lights,
             light_names,
             media,

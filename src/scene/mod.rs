@@ -18,8 +18,8 @@ use std::sync::Arc;
 use crate::cameras::CameraDesc;
 use crate::color::Rgb;
 use crate::geometry::{Footprint, Geometry, LightId, MaterialId, Ray, Surface, SurfacePoint};
-use crate::lights::Light;
-use crate::materials::{Bsdf, Material, TransportMode};
+use crate::lights::{LiSample, Light, Parallelogram};
+use crate::materials::{Bsdf, Material, Matte, TransportMode};
 use crate::math::{Aabb, DVec3};
 use crate::textures::Texture;
 
@@ -29,12 +29,16 @@ pub struct Scene {
     pub geometry: Arc<Geometry>,
     /// Materials, named by [`MaterialId`].
     pub materials: Vec<Box<dyn Material>>,
+    /// Reflectance of those that are [matte](Material::matte).
+    pub matte: Vec<Option<Rgb>>,
     /// Names of the materials, for reports.
     pub material_names: Vec<String>,
     /// The textures of all materials. Without any, nobody needs footprints.
     pub textures: Vec<Texture>,
     /// Lights, named by [`LightId`].
     pub lights: Vec<Box<dyn Light>>,
+    /// Those of them that are [parallelograms](Light::parallelogram).
+    pub parallelograms: Vec<Option<Parallelogram>>,
     /// Names and kinds of the lights, for reports.
     pub light_names: Vec<(String, &'static str)>,
     /// How lights are chosen for a shading point.
@@ -96,6 +100,12 @@ impl Scene {
             .scatter(&self.surface(sp, footprint), bsdf);
     }
 
+    /// The scattering function at a surface point, if it is no more than one Lambert lobe.
+    #[inline(always)]
+    pub fn matte(&self, sp: &SurfacePoint) -> Option<Matte> {
+        self.matte[sp.material.index()].map(|albedo| Matte::new(sp, albedo))
+    }
+
     /// The scattering function at a surface point, for those who are not in a hurry.
     pub fn bsdf(
         &self,
@@ -114,6 +124,15 @@ impl Scene {
         sp.light.map_or(Rgb::ZERO, |id| {
             self.light(id).radiance(&self.surface(sp, footprint))
         })
+    }
+
+    /// As [`Light::sample_li`], without a call for the commonest light.
+    #[inline(always)]
+    pub fn sample_li(&self, id: LightId, p: DVec3, u: [f64; 2]) -> Option<LiSample> {
+        match &self.parallelograms[id.index()] {
+            Some(light) => light.sample_li(p, u),
+            None => self.light(id).sample_li(p, u),
+        }
     }
 
     /// The density in solid angle with which light sampling at `from` finds the emitter at `on`.

@@ -14,15 +14,7 @@ impl Bsdf {
     /// A surface that absorbs everything, until lobes are pushed.
     #[inline(always)]
     pub fn new(sp: &SurfacePoint, mode: TransportMode) -> Self {
-        let (ng, mut n) = if sp.front {
-            (sp.ng, sp.n)
-        } else {
-            (-sp.ng, -sp.n)
-        };
-        if sp.wo.dot(n) <= 0.0 {
-            // The interpolated normal faces away from a visible point.
-            n = ng;
-        }
+        let (n, ng) = Self::normals(sp);
         let frame = Frame::from_normal(n);
         Self {
             main: View {
@@ -39,6 +31,18 @@ impl Bsdf {
             total: 0.0,
             shown: None,
         }
+    }
+
+    /// Shading and geometric normal on the side of `wo`.
+    #[inline(always)]
+    pub(super) fn normals(sp: &SurfacePoint) -> (DVec3, DVec3) {
+        let (ng, n) = if sp.front {
+            (sp.ng, sp.n)
+        } else {
+            (-sp.ng, -sp.n)
+        };
+        // An interpolated normal may face away from a visible point.
+        (if sp.wo.dot(n) > 0.0 { n } else { ng }, ng)
     }
 
     /// Shows a colour, as radiance, to whoever looks at the surface, whatever the light.
@@ -104,7 +108,7 @@ impl Bsdf {
     /// As [`push`](Self::push), in one of the frames.
     #[inline]
     pub fn push_in(&mut self, lobe: impl LobeModel + Into<Lobe>, frame: FrameId) {
-        let pick = lobe.albedo(self.view(frame).wo).max_channel();
+        let pick = lobe.importance(self.view(frame).wo);
         let entry = Entry {
             lobe: lobe.into(),
             pick,

@@ -6,6 +6,11 @@
 //! can partition path space by class.
 
 mod build;
+mod matte;
+mod scattering;
+
+pub use matte::Matte;
+pub use scattering::Scattering;
 
 use std::ops::Mul;
 

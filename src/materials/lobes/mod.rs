@@ -71,6 +71,11 @@ pub trait LobeModel {
     }
     /// Directional albedo, possibly approximate: used to pick lobes and for display.
     fn albedo(&self, wo: DVec3) -> Rgb;
+    /// What the lobe is picked by among others: near its albedo's largest channel, and positive
+    /// wherever that is.
+    fn importance(&self, wo: DVec3) -> f64 {
+        self.albedo(wo).max_channel()
+    }
     /// Index beyond the surface over index on the side of `wo`, for lobes that refract.
     fn eta(&self) -> f64 {
         1.0
@@ -142,6 +147,9 @@ impl LobeModel for CustomLobe {
     fn albedo(&self, wo: DVec3) -> Rgb {
         (**self).albedo(wo)
     }
+    fn importance(&self, wo: DVec3) -> f64 {
+        (**self).importance(wo)
+    }
     fn eta(&self) -> f64 {
         (**self).eta()
     }
@@ -184,6 +192,10 @@ macro_rules! lobes {
             #[inline]
             fn albedo(&self, wo: DVec3) -> Rgb {
                 match self { $(Self::$name(l) => l.albedo(wo),)* }
+            }
+            #[inline]
+            fn importance(&self, wo: DVec3) -> f64 {
+                match self { $(Self::$name(l) => l.importance(wo),)* }
             }
             #[inline]
             fn eta(&self) -> f64 {

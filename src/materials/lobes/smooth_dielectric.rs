@@ -3,7 +3,7 @@
 use super::{Branches, LobeClass, LobeModel, LobeSample, pick};
 use crate::color::Rgb;
 use crate::materials::fresnel;
-use crate::math::DVec3;
+use crate::math::{DVec3, nearly_unit};
 
 /// A smooth interface between two dielectrics, with exact Fresnel terms.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,7 @@ impl LobeModel for SmoothDielectric {
         if !refracted.is_black() {
             let inv = 1.0 / self.eta;
             out.push(LobeSample {
-                wi: DVec3::new(-wo.x * inv, -wo.y * inv, -f.cos_t).normalize(),
+                wi: nearly_unit(DVec3::new(-wo.x * inv, -wo.y * inv, -f.cos_t)).0,
                 weight: refracted,
                 pdf: 0.0,
             });
@@ -67,6 +67,12 @@ impl LobeModel for SmoothDielectric {
     fn albedo(&self, wo: DVec3) -> Rgb {
         let [reflected, refracted] = self.split(&fresnel::dielectric(wo.z, self.eta));
         reflected + refracted
+    }
+
+    #[inline]
+    fn importance(&self, _wo: DVec3) -> f64 {
+        // What Fresnel's equations part is whole: no need to solve them for this.
+        (self.share * (self.reflect.max_channel().max(self.tint.max_channel()))).max_channel()
     }
 
     #[inline]
