@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::film::{Channel, Component, Film, Layer};
 use crate::integrators::{
     IntegratorSettings, PixelPlan, Region, RenderContext, Spacing, Visibility, camera_pass,
-    planned_camera_pass,
+    guarded, planned_camera_pass,
 };
 use crate::photons::{PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons};
 use crate::plugins::Registry;
@@ -243,6 +243,7 @@ fn render_in_pool(
         (done, session.seconds),
     );
     let mut standing = forecast.standing(&film, done, true);
+    let accel = guarded(accel, scene, &*camera, &spacing, options.seed);
     let visibility = Visibility::learn(scene, &*accel, &*camera, &spacing, options.seed);
     while done < settings.spp && control.stopped().is_none() && !standing.reached(target) {
         let mut samples = settings.spp - done;

@@ -127,11 +127,10 @@ fn columns(m: &DAffine3) -> [[f32; 3]; 4] {
 
 fn build_scene(
     geometry: &Arc<Geometry>,
-    threads: usize,
+    device: Device,
     empty: fn(&Device) -> Result<SceneBuilder, EmbreeError>,
 ) -> Result<Embree, EmbreeError> {
     let start = Instant::now();
-    let device = Device::new(&format!("threads={}", threads.max(1)))?;
     let mut top = empty(&device)?;
     // One scene for each shape, and one more for each material through which it is not whole.
     let mut shared: HashMap<(ShapeId, Option<MaterialId>), CommittedScene> = HashMap::new();
@@ -161,14 +160,31 @@ fn build_scene(
     })
 }
 
+/// A device with its own threads and, if not empty, more settings.
+fn device(threads: usize, more: &str) -> Result<Device, EmbreeError> {
+    Device::new(&format!("threads={}{more}", threads.max(1)))
+}
+
+fn made(built: Result<Embree, EmbreeError>) -> Result<Box<dyn Accelerator>> {
+    Ok(Box::new(built.map_err(failure)?))
+}
+
 fn build(geometry: &Arc<Geometry>, threads: usize) -> Result<Box<dyn Accelerator>> {
-    let scene = build_scene(geometry, threads, SceneBuilder::new).map_err(failure)?;
-    Ok(Box::new(scene))
+    made(device(threads, "").and_then(|d| build_scene(geometry, d, SceneBuilder::new)))
 }
 
 fn build_fast(geometry: &Arc<Geometry>, threads: usize) -> Result<Box<dyn Accelerator>> {
-    let scene = build_scene(geometry, threads, SceneBuilder::fast).map_err(failure)?;
-    Ok(Box::new(scene))
+    made(device(threads, "").and_then(|d| build_scene(geometry, d, SceneBuilder::fast)))
+}
+
+/// Embree held to one set of instructions (`sse2`, `sse42`, `avx`, `avx2`, `avx512`), on one
+/// thread: it rounds otherwise with each, which is how machines differ.
+///
+/// # Errors
+/// A set that the processor or the library does not have.
+pub fn with_instructions(set: &str, geometry: &Arc<Geometry>) -> Result<Box<dyn Accelerator>> {
+    let device = device(1, &format!(",isa={set}"));
+    made(device.and_then(|d| build_scene(geometry, d, SceneBuilder::new)))
 }
 
 /// The registry's line.

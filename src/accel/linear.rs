@@ -163,6 +163,10 @@ impl Accelerator for Linear {
         self.nearest(ray, true).is_some()
     }
 
+    fn watertight(&self) -> bool {
+        true
+    }
+
     fn stats(&self) -> BuildStats {
         BuildStats {
             backend: "linear".into(),

@@ -17,11 +17,13 @@ mod bvh;
 mod crosscheck;
 #[cfg(feature = "embree")]
 mod embree;
+mod guard;
 mod linear;
 
 pub use crosscheck::{Class, CrossCheck, Finding};
 #[cfg(feature = "embree")]
-pub use embree::FAST as EMBREE_FAST;
+pub use embree::{FAST as EMBREE_FAST, with_instructions as embree_with_instructions};
+pub use guard::Guarded;
 
 use std::sync::Arc;
 
@@ -48,6 +50,11 @@ pub trait Accelerator: Send + Sync {
 
     /// Whether anything at all lies on the segment.
     fn occluded(&self, ray: &Ray) -> bool;
+
+    /// Whether no ray, not even one at a vertex, passes between triangles that share an edge.
+    fn watertight(&self) -> bool {
+        false
+    }
 
     /// What building took.
     fn stats(&self) -> BuildStats;

@@ -11,12 +11,14 @@ mod pixel_edges;
 mod pixel_plan;
 mod settings;
 mod stored_light;
+mod trials;
 mod visibility;
 
 pub use camera_pass::{Region, camera_pass};
 pub use footprint::Spacing;
 pub use pixel_plan::{PixelPlan, planned_camera_pass};
 pub use settings::IntegratorSettings;
+pub use trials::guarded;
 pub use visibility::Visibility;
 
 use crate::accel::Accelerator;

@@ -5,18 +5,13 @@
 //! by them: trials that are wrong cost noise, never light.
 
 use super::Spacing;
+use super::trials::walk;
 use crate::accel::Accelerator;
 use crate::cameras::Camera;
-use crate::geometry::{Ray, SurfacePoint};
-use crate::math::{DVec3, Frame};
-use crate::sampling::{Sampler, stream, warp};
+use crate::geometry::SurfacePoint;
+use crate::math::DVec3;
+use crate::sampling::Sampler;
 use crate::scene::Scene;
-
-/// Points of the image through which trials start, along each edge.
-const VIEWS: u32 = 48;
-
-/// Surfaces of a trial: the one seen, and those that diffuse bounces reach from there.
-const BOUNCES: u32 = 3;
 
 /// Cells along each edge of the box around what the trials met.
 const CELLS: usize = 24;
@@ -59,24 +54,9 @@ impl Visibility {
             return Self::default();
         }
         let mut trials = Vec::new();
-        for y in 0..VIEWS {
-            for x in 0..VIEWS {
-                let index = u64::from(y * VIEWS + x);
-                let mut sampler = Sampler::new(seed, stream::TRIALS, 0, index);
-                let [jx, jy] = sampler.next_2d();
-                let at = |i: u32, j: f64, size: f64| (f64::from(i) + j) / f64::from(VIEWS) * size;
-                let (px, py) = (at(x, jx, spacing.image[0]), at(y, jy, spacing.image[1]));
-                let mut ray = spacing.camera_ray(camera, px, py, [0.5; 2], false).ray;
-                for _ in 0..BOUNCES {
-                    let Some(hit) = accel.intersect(&ray) else {
-                        break;
-                    };
-                    let sp = scene.surface_point(&ray, &hit);
-                    trials.push(try_lights(scene, accel, &sp, &mut sampler));
-                    ray = bounce(&sp, sampler.next_2d());
-                }
-            }
-        }
+        walk(scene, accel, camera, spacing, seed, |met, sampler| {
+            trials.extend(met.map(|sp| try_lights(scene, accel, sp, sampler)));
+        });
         Self::of(&trials, scene.lights.len())
     }
 
@@ -171,10 +151,4 @@ fn try_lights(
         p: sp.p,
         lights: lights.collect(),
     }
-}
-
-/// A diffuse bounce on the side that was met, whatever the surface is made of.
-fn bounce(sp: &SurfacePoint, u: [f64; 2]) -> Ray {
-    let n = if sp.front { sp.ng } else { -sp.ng };
-    sp.spawn(Frame::from_normal(n).to_world(warp::cosine_hemisphere(u)))
 }

@@ -14,11 +14,6 @@ pub enum PhotonClass {
     Indirect,
 }
 
-impl PhotonClass {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Direct, Self::Caustic, Self::Indirect];
-}
-
 /// A photon that arrived at a diffuse surface; 36 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {

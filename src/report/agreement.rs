@@ -1,5 +1,7 @@
 //! Two backends on many rays: how often they agree, and the rays on which they do worst.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -111,7 +113,8 @@ pub fn ask(check: &CrossCheck<'_>, kind: RayKind, ray: &Ray) -> Finding {
     }
 }
 
-/// Compares `rays` rays in all, shared evenly by the kinds, and keeps the `keep` worst.
+/// Compares `rays` rays in all, shared evenly by the kinds, and keeps the `keep` worst. What a kind
+/// has no rays for, as photons where there is no light, is left to random ones.
 pub fn compare(
     check: &CrossCheck<'_>,
     maker: &RayMaker<'_>,
@@ -121,17 +124,14 @@ pub fn compare(
 ) -> Agreement {
     let stage = control.stage("compare", "rays", rays);
     let mut out = Agreement::default();
-    let n = RayKind::ALL.len() as u64;
-    for (k, kind) in RayKind::ALL.into_iter().enumerate() {
-        let (first, end) = (rays * k as u64 / n, rays * (k as u64 + 1) / n);
-        let count = end - first;
-        let parts: Vec<(Tally, Vec<Case>)> = (0..count.div_ceil(BATCH))
+    let mut compare = |kind: RayKind, numbers: Range<u64>| {
+        let parts: Vec<(Tally, Vec<Case>)> = (0..(numbers.end - numbers.start).div_ceil(BATCH))
             .into_par_iter()
             .map(|b| {
                 let mut part = Agreement::default();
                 let mut tally = Tally::default();
-                let (lo, hi) = (b * BATCH, ((b + 1) * BATCH).min(count));
-                for i in lo..hi {
+                let first = numbers.start + b * BATCH;
+                for i in first..(first + BATCH).min(numbers.end) {
                     if control.stopped().is_some() {
                         break;
                     }
@@ -145,7 +145,7 @@ pub fn compare(
                     }
                 }
                 part.keep_worst(keep);
-                stage.advance(hi - lo);
+                stage.advance(tally.rays);
                 (tally, part.worst)
             })
             .collect();
@@ -154,6 +154,23 @@ pub fn compare(
             sum.add(&tally);
             out.worst.extend(worst);
             out.keep_worst(keep);
+        }
+        sum
+    };
+    let n = RayKind::ALL.len() as u64;
+    let share = |k: u64| rays * k / n;
+    let mut kinds: Vec<(RayKind, Tally)> = RayKind::ALL
+        .into_iter()
+        .zip(0..)
+        .map(|(kind, k)| (kind, compare(kind, 0..share(k + 1) - share(k))))
+        .collect();
+    let left = rays - kinds.iter().map(|(_, t)| t.rays).sum::<u64>();
+    // Numbers that no share above came to.
+    kinds.push((RayKind::Random, compare(RayKind::Random, rays..rays + left)));
+    for kind in RayKind::ALL {
+        let mut sum = Tally::default();
+        for (_, t) in kinds.iter().filter(|(k, _)| *k == kind) {
+            sum.add(t);
         }
         out.kinds.push((kind, sum));
     }

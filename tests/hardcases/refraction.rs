@@ -51,7 +51,52 @@ pub fn r1(row: &mut Row) {
         cos_t,
         2.0 * f64::EPSILON.sqrt(),
     );
-    row.note("derivatives through two refractions: D9");
+    slopes(row);
+    row.note(
+        "the derivative of the refracted direction is `cos θi / (η cos θt)`: its own error is ε/cos²θt, \
+         as that of any double-precision cosine near its root. Below cos²θt = 1e-9 it is none, and \
+         the ray keeps the spread it came with. Derivatives through two refractions: D9",
+    );
+}
+
+/// How the refracted direction turns with the direction, next to the critical angle.
+fn slopes(row: &mut Row) {
+    use dualight::geometry::{Differential, Ray};
+    let g = crate::scenes::mesh(crate::scenes::plane(1, DVec3::ZERO, 100.0));
+    let [mut slope, mut mirrored] = [Meter::default(); 2];
+    let eta: f64 = 1.0 / 1.5;
+    let critical = eta.asin();
+    let exact_accel = backends(&g).pop().unwrap().1;
+    for k in 2..=7 {
+        for side in [-1.0, 1.0] {
+            for j in 1..=100 {
+                let angle = critical + side * 10f64.powi(-k) * f64::from(j) / 10.0;
+                let (sin, cos) = angle.sin_cos();
+                let ray = Ray::new(DVec3::new(0.3, 0.2, 2.0), DVec3::new(sin, 0.0, -cos));
+                let hit = exact_accel.intersect(&ray).unwrap();
+                let sp = g.surface_point(&ray, &hit);
+                let cos = sp.wo.dot(sp.n);
+                let turn = DVec3::new(cos, 0.0, (1.0 - cos * cos).sqrt());
+                let bundle = Differential {
+                    origin: [DVec3::ZERO; 2],
+                    direction: [turn, DVec3::Y],
+                };
+                let landing = bundle.land(&g, &ray, &sp).unwrap();
+                let tangent = -sp.wo + sp.n * cos;
+                let Some([ct, _]) = exact(cos, eta) else {
+                    let out = landing.follow(&sp, sp.n * cos + tangent);
+                    mirrored.see((out.direction[0].length() - turn.length()).abs());
+                    continue;
+                };
+                let out = landing.follow(&sp, tangent / eta - sp.n * ct);
+                let got = out.direction[0];
+                let want = turn.length() * cos / (eta * ct);
+                slope.see(relative(got.length(), want) * ct * ct / f64::EPSILON);
+            }
+        }
+    }
+    row.line("dual", "derivative of refraction, in ε/cos²θt", slope, 16.0);
+    row.line("dual", "derivative of reflection", mirrored, 1e-14);
 }
 
 pub fn r2(row: &mut Row) {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dualight::accel::Accelerator;
+use dualight::accel::{Accelerator, Guarded};
 use dualight::ad::V3;
 use dualight::geometry::triangle::plane_hit;
 use dualight::geometry::{Geometry, Ray, TriangleMesh};
@@ -160,7 +160,8 @@ fn lost(
         ];
         for (k, m) in meshes.into_iter().enumerate() {
             let g = mesh(m);
-            for (name, accel) in backends(&g) {
+            let guards = backends(&g).into_iter().map(|(_, a)| Guarded::new(a));
+            for ((name, accel), guard) in backends(&g).into_iter().zip(guards) {
                 let slot = match out.iter_mut().position(|l| l.0 == name) {
                     Some(i) => i,
                     None => {
@@ -182,19 +183,8 @@ fn lost(
                     let to = target(&mut rng, &v);
                     let mut ray = Ray::new(o, DVec3::Z);
                     ray.d = (to - ray.origin()).as_vec3();
-                    let found = accel.intersect(&ray).is_some();
-                    out[slot].1.must(found);
-                    // The guard: the same ray, its direction off by one last place.
-                    let again = || {
-                        let mut jittered = ray;
-                        jittered.d = dualight::math::Vec3::new(
-                            ray.d.x.next_up(),
-                            ray.d.y.next_down(),
-                            ray.d.z.next_up(),
-                        );
-                        accel.intersect(&jittered).is_some()
-                    };
-                    out[slot].2.must(found || again());
+                    out[slot].1.must(accel.intersect(&ray).is_some());
+                    out[slot].2.must(guard.intersect(&ray).is_some());
                 }
             }
         }
@@ -228,12 +218,12 @@ pub fn t3(row: &mut Row) {
     for (what, guarded, list) in [
         (
             "lost at vertices",
-            "lost at vertices with a second try",
+            "lost at vertices with the guard",
             lost(3400, vertex),
         ),
         (
             "lost at edges",
-            "lost at edges with a second try",
+            "lost at edges with the guard",
             lost(3400, edge),
         ),
     ] {
@@ -245,19 +235,15 @@ pub fn t3(row: &mut Row) {
                 raw,
                 if exact { 0.0 } else { 0.005 * raw.n as f64 },
             );
-            row.line(
-                name,
-                guarded,
-                guard,
-                if exact { 0.0 } else { 5e-4 * guard.n as f64 },
-            );
+            row.line(name, guarded, guard, 0.0);
         }
     }
     row.note(
-        "Embree loses some rays that are aimed at the very bits of a vertex or edge, also in robust \
-         mode (embree#181 and #387). Asking once more with a direction one last place off finds \
-         nearly all of them, at the price of a second search for every ray that leaves the scene; \
-         since no random ray is lost (T2), rendering does without. `bvh` loses none",
+        "Embree loses some rays that are aimed at the very bits of a vertex, also in robust mode \
+         (embree#181 and #387): its three edge functions round apart there, by more than the one \
+         last place that it allows them. None is lost at an edge, whose two triangles compute the \
+         same number. The guard asks again 4 and 16 last places aside; of 1.6e6 rays at vertices it \
+         found all 1160 that were lost. When it is put on: see below. `bvh` needs none",
     );
 }
 

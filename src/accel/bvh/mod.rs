@@ -209,6 +209,10 @@ impl Accelerator for Bvh {
         self.best::<true>(ray).is_some()
     }
 
+    fn watertight(&self) -> bool {
+        true
+    }
+
     fn stats(&self) -> BuildStats {
         self.stats.clone()
     }

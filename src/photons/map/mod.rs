@@ -15,8 +15,6 @@ pub use nearest::Nearest;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use arrayvec::ArrayVec;
-
 use super::photon::{PackedNormal, Photon, PhotonClass};
 use crate::color::Rgb;
 use crate::geometry::Shape;
@@ -96,8 +94,6 @@ impl Side {
 pub struct PhotonMap {
     tree: KdTree,
     photons: Vec<Photon>,
-    /// Those that there are.
-    classes: ArrayVec<PhotonClass, 3>,
     nearest: usize,
     max_radius: f32,
     kernels: Option<Arc<Kernels>>,
@@ -120,16 +116,9 @@ impl PhotonMap {
     pub fn build(mut photons: Vec<Photon>, nearest: usize, area: f64) -> Self {
         let tree = KdTree::build(&mut photons, |p| p.p);
         let even = even_radius(nearest, area, photons.len() as f64);
-        let mut classes = ArrayVec::new();
-        for class in PhotonClass::ALL {
-            if photons.iter().any(|p| p.class == class) {
-                classes.push(class);
-            }
-        }
         Self {
             tree,
             photons,
-            classes,
             nearest: nearest.max(2),
             max_radius: (REACH * even) as f32,
             kernels: None,
@@ -187,13 +176,6 @@ impl PhotonMap {
         keep: impl Fn(PhotonClass) -> bool,
         f: impl Fn(DVec3) -> Rgb,
     ) -> Estimate {
-        // Nothing is nowhere: a search for it would never be satisfied and see everything.
-        if !self.classes.iter().any(|&class| keep(class)) {
-            return Estimate {
-                radius: f64::from(self.max_radius),
-                ..Default::default()
-            };
-        }
         let Some(kernels) = &self.kernels else {
             return self.estimate_nearest(site, found, keep, f);
         };

@@ -1,0 +1,85 @@
+//! A few paths from the camera before rendering, to find out what a scene is like.
+
+use super::Spacing;
+use crate::accel::{Accelerator, Guarded};
+use crate::cameras::Camera;
+use crate::geometry::{Ray, SurfacePoint};
+use crate::math::Frame;
+use crate::sampling::{Sampler, stream, warp};
+use crate::scene::Scene;
+
+/// Points of the image through which trials start, along each edge.
+const VIEWS: u32 = 48;
+
+/// Surfaces of a trial: the one seen, and those that diffuse bounces reach from there.
+const BOUNCES: u32 = 3;
+
+/// Largest share of rays that may leave a scene for them to be asked about twice more: together
+/// they then take 1 % of all questions.
+const LEAVING: f64 = 0.005;
+
+/// Tells `met` what each ray of each trial met, `None` for one that left the scene.
+pub(super) fn walk(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    camera: &dyn Camera,
+    spacing: &Spacing,
+    seed: u64,
+    mut met: impl FnMut(Option<&SurfacePoint>, &mut Sampler),
+) {
+    for y in 0..VIEWS {
+        for x in 0..VIEWS {
+            let index = u64::from(y * VIEWS + x);
+            let mut sampler = Sampler::new(seed, stream::TRIALS, 0, index);
+            let [jx, jy] = sampler.next_2d();
+            let at = |i: u32, j: f64, size: f64| (f64::from(i) + j) / f64::from(VIEWS) * size;
+            let (px, py) = (at(x, jx, spacing.image[0]), at(y, jy, spacing.image[1]));
+            let mut ray = spacing.camera_ray(camera, px, py, [0.5; 2], false).ray;
+            for _ in 0..BOUNCES {
+                let Some(hit) = accel.intersect(&ray) else {
+                    met(None, &mut sampler);
+                    break;
+                };
+                let sp = scene.surface_point(&ray, &hit);
+                met(Some(&sp), &mut sampler);
+                ray = bounce(&sp, sampler.next_2d());
+            }
+        }
+    }
+}
+
+/// A diffuse bounce on the side that was met, whatever the surface is made of.
+fn bounce(sp: &SurfacePoint, u: [f64; 2]) -> Ray {
+    let n = if sp.front { sp.ng } else { -sp.ng };
+    sp.spawn(Frame::from_normal(n).to_world(warp::cosine_hemisphere(u)))
+}
+
+/// Puts a guard against leaks on a backend that needs one, if rays hardly leave the scene.
+pub fn guarded(
+    accel: Box<dyn Accelerator>,
+    scene: &Scene,
+    camera: &dyn Camera,
+    spacing: &Spacing,
+    seed: u64,
+) -> Box<dyn Accelerator> {
+    if accel.watertight() || !scene.geometry.is_whole() {
+        return accel;
+    }
+    let (mut rays, mut left) = (0u32, 0u32);
+    walk(scene, &*accel, camera, spacing, seed, |met, _| {
+        rays += 1;
+        left += match met {
+            None => 1,
+            // What lies behind glass is not walked to: what could leave there counts as leaving.
+            Some(sp) if scene.material(sp.material).traits().transmits => {
+                let through = accel.intersect(&sp.spawn(-sp.wo));
+                u32::from(through.is_none())
+            }
+            Some(_) => 0,
+        };
+    });
+    match f64::from(left) <= LEAVING * f64::from(rays) {
+        true => Box::new(Guarded::new(accel)),
+        false => accel,
+    }
+}
