@@ -77,7 +77,12 @@ def collect_lamps(scene):
         if lamp.use_nodes and any(n.type not in {'EMISSION', 'OUTPUT_LIGHT'}
                                   for n in lamp.node_tree.nodes):
             warn(f"lamp '{ob.name}': its nodes are not exported")
-        entry = {"color": lamp_color(lamp), "power": power_of(lamp, ob), "type": lamp.type}
+        color, power = lamp_color(lamp), power_of(lamp, ob)
+        # Warm lamps are more than 1 in red, and glTF's colours end at 1.
+        most = max(color)
+        if most > 1.0:
+            color, power = [c / most for c in color], power * most
+        entry = {"color": color, "power": power, "type": lamp.type}
         seen = bool(ob.visible_camera)
         if lamp.type == 'AREA':
             if lamp.spread < math.pi * 0.999:
@@ -87,8 +92,8 @@ def collect_lamps(scene):
             size = width if shape in {"square", "disk"} else [width, height]
             sx, sy = scale_of(ob)
             entry["node"] = {"area_light": {
-                "shape": shape, "size": size, "power": entry["power"],
-                "color": entry["color"], "seen_by_camera": seen,
+                "shape": shape, "size": size, "power": power,
+                "color": color, "seen_by_camera": seen,
             }}
             if sx == 0 or sy == 0:
                 warn(f"lamp '{ob.name}' has no area and is left out")

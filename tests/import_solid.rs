@@ -68,3 +68,38 @@ fn a_volume_that_the_file_gives_is_left_alone() {
     let scene = a.read().unwrap();
     assert_eq!(solid(&scene), (true, true, false));
 }
+
+#[test]
+fn a_body_of_two_materials_is_judged_as_a_whole() {
+    // The tetrahedron's last side is of another material: each part is open, both enclose a body.
+    let mut a = glass("Khronos glTF Blender I/O v4.5.47");
+    let three = a.shorts("SCALAR", &[0, 2, 1, 0, 1, 3, 0, 3, 2]);
+    let last = a.shorts("SCALAR", &[1, 2, 3]);
+    let whole = a.json["meshes"][1]["primitives"][0].clone();
+    let (mut sides, mut lid) = (whole.clone(), whole);
+    sides["indices"] = json!(three);
+    lid["indices"] = json!(last);
+    lid["material"] = json!(1);
+    let metal = json!({"name": "metal"});
+    a.json["materials"].as_array_mut().unwrap().push(metal);
+    a.json["meshes"][1]["primitives"] = json!([sides, lid]);
+    assert_eq!(solid(&a.read().unwrap()), (false, true, true));
+    // Without its lid it is open.
+    a.json["meshes"][1]["primitives"] = json!([sides]);
+    assert_eq!(solid(&a.read().unwrap()), (false, false, false));
+}
+
+#[test]
+fn glass_that_says_its_thickness_is_zero_stays_thin() {
+    let mut a = glass("Khronos glTF Blender I/O v4.5.47");
+    let volume = json!({"thicknessFactor": 0, "attenuationDistance": 2});
+    a.json["materials"][0]["extensions"]["KHR_materials_volume"] = volume;
+    for solid_glass in [SolidGlass::Auto, SolidGlass::Always] {
+        let options = ImportOptions {
+            solid_glass,
+            ..Default::default()
+        };
+        let scene = a.read_with(&options).unwrap();
+        assert_eq!(solid(&scene), (false, false, false));
+    }
+}

@@ -15,6 +15,7 @@ mod environment;
 mod extras;
 mod hierarchy;
 mod image;
+mod image_based;
 mod implicit;
 mod instancing;
 mod inventory;
@@ -43,6 +44,7 @@ use std::path::Path;
 
 pub use crate::color::units::LightUnits;
 use crate::error::{Error, Result};
+use crate::lights::LightDesc;
 use crate::materials::MaterialDesc;
 use crate::scene::{Scene, SceneBuilder, ScenePlugins};
 use accessor::Source;
@@ -93,6 +95,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_mesh_quantization",
     "KHR_node_visibility",
     "KHR_implicit_shapes",
+    image_based::NAME,
     "EXT_mesh_gpu_instancing",
     #[cfg(feature = "draco")]
     "KHR_draco_mesh_compression",
@@ -208,7 +211,7 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
     let root = Cursor::root(&document.json);
     let source = Source::new(root.clone(), &document.buffers, document.size);
     let mut images = Images::new(&source, path);
-    let own = fill(
+    fill(
         &root,
         &source,
         &mut images,
@@ -224,9 +227,6 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
             other => other,
         },
     })?;
-    if let Some(environment) = options.environment.as_ref().or(own.as_ref()) {
-        builder.add_light(environment.light()?);
-    }
     for (what, n) in notes.0 {
         builder.warn(if n > 1 {
             format!("{what} ({n} times)")
@@ -266,7 +266,7 @@ impl From<Problem> for Failure {
     }
 }
 
-/// Fills the scene; gives back the environment that the file itself asks for.
+/// Fills the scene.
 fn fill<'a>(
     root: &Cursor<'a>,
     source: &Source<'a>,
@@ -275,7 +275,7 @@ fn fill<'a>(
     options: &ImportOptions,
     builder: &mut SceneBuilder,
     notes: &mut Notes,
-) -> Result<Option<EnvironmentOption>, Failure> {
+) -> Result<(), Failure> {
     let animations = root.items("animations")?.len();
     if animations > 0 && options.time.is_none() {
         builder.inform("animations are at rest; --time or --frame shows them at a moment");
@@ -289,11 +289,15 @@ fn fill<'a>(
     for (_, m) in entries.iter().enumerate().filter(|(i, _)| used.contains(i)) {
         material::read(m, images, &mut Notes::default())?;
     }
+    if options.environment.is_none() {
+        image_based::want(&scene, root, images)?;
+    }
     images.decode()?;
     let mut materials = Vec::new();
     let mut solid = HashMap::new();
+    let blender = light::from_blender(root);
     let takes_solid = match options.solid_glass {
-        SolidGlass::Auto => light::from_blender(root),
+        SolidGlass::Auto => blender,
         SolidGlass::Always => true,
         SolidGlass::Never => false,
     };
@@ -301,11 +305,14 @@ fn fill<'a>(
     for (i, m) in entries.iter().enumerate() {
         let mut desc = material::read(m, images, notes)?;
         desc.vertex_colors = colored.contains(&Some(i));
+        // Backface culling, which this says of Blender's materials, is for its rasteriser alone:
+        // in Cycles surfaces emit from both sides.
+        desc.double_sided |= blender;
         let id = builder
             .add_material(&desc)
             .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
         materials.push(id);
-        if let Some(twin) = solid::twin(&desc).filter(|_| takes_solid) {
+        if let Some(twin) = solid::twin(m, &desc).filter(|_| takes_solid) {
             let twin = builder
                 .add_material(&twin)
                 .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
@@ -348,7 +355,30 @@ fn fill<'a>(
              --solid-glass never takes them for thin walls"
         ));
     }
-    Ok(environment::of_scene(&scene, path, notes)?)
+    if let Some(light) = surroundings(&scene, root, images, path, options, notes)? {
+        builder.add_light(light);
+    }
+    Ok(())
+}
+
+/// Light from all around: what the user asks for goes before our extras, and these before the
+/// extension.
+fn surroundings<'a>(
+    scene: &Cursor<'a>,
+    root: &Cursor<'a>,
+    images: &mut Images<'a>,
+    path: &Path,
+    options: &ImportOptions,
+    notes: &mut Notes,
+) -> Result<Option<LightDesc>, Failure> {
+    let extras = environment::of_scene(scene, path, notes)?;
+    if let Some(environment) = options.environment.as_ref().or(extras.as_ref()) {
+        let light = environment.light();
+        return light
+            .map(Some)
+            .map_err(|e| Failure::Plugin(scene.path().to_owned(), Box::new(e)));
+    }
+    Ok(image_based::of_scene(scene, root, images, notes)?)
 }
 
 fn check_extensions(root: &Cursor<'_>, notes: &mut Notes) -> Result<(), Problem> {

@@ -54,9 +54,11 @@ struct Posed<'a> {
     skin: Option<Skin>,
     /// Indices of its primitives among the jobs, with their materials.
     parts: Vec<(usize, MaterialId)>,
+    /// Its primitives enclose a volume together, though not each for itself.
+    closed: bool,
 }
 
-/// A shape, and whether glass of this shape can be solid.
+/// A shape, and whether glass of this shape alone can be solid.
 #[derive(Clone, Copy)]
 struct Made {
     shape: ShapeId,
@@ -77,8 +79,8 @@ struct Use {
 struct Job<'a> {
     primitive: Cursor<'a>,
     posed: usize,
-    /// Texture coordinates along which tangents are wanted.
-    tangents: Option<usize>,
+    /// Along what tangents are wanted.
+    tangents: Option<tangents::Wanted>,
     name: String,
 }
 
@@ -123,7 +125,7 @@ impl<'a> Walker<'a, '_> {
             }
         }
         let jobs = self.jobs(&mut met.posed)?;
-        let shapes = self.read(&jobs, &met.posed)?;
+        let shapes = self.read(&jobs, &mut met.posed)?;
         for u in &met.uses {
             self.place_all(u, &met.posed[u.posed], &shapes);
         }
@@ -223,6 +225,7 @@ impl<'a> Walker<'a, '_> {
                 None => None,
             },
             parts: Vec::new(),
+            closed: false,
         });
         Ok(met.posed.len() - 1)
     }
@@ -270,11 +273,8 @@ impl<'a> Walker<'a, '_> {
     fn read(
         &mut self,
         jobs: &[Job<'a>],
-        posed: &[Posed<'a>],
+        posed: &mut [Posed<'a>],
     ) -> Result<Vec<Option<Made>>, Problem> {
-        let parts = posed.iter().flat_map(|p| &p.parts);
-        let glass = parts.filter(|(_, m)| !self.open_too && self.solid.contains_key(m));
-        let asked: HashSet<usize> = glass.map(|&(job, _)| job).collect();
         let source = self.source;
         let done: Vec<_> = jobs
             .par_iter()
@@ -284,21 +284,55 @@ impl<'a> Walker<'a, '_> {
                 (part, notes)
             })
             .collect();
-        let mut shapes = Vec::new();
-        for (i, ((part, notes), job)) in done.into_iter().zip(jobs).enumerate() {
+        let mut parts = Vec::new();
+        for (part, notes) in done {
             self.notes.join(notes);
-            shapes.push(part?.map(|p| match p {
-                Part::Mesh(m) => Made {
-                    solid: self.open_too || (asked.contains(&i) && solid::is_closed(&m)),
-                    shape: self.builder.add_mesh(m, &job.name),
-                },
-                Part::Spheres(s) => Made {
-                    solid: true,
-                    shape: self.builder.add_spheres(s, &job.name),
-                },
-            }));
+            parts.push(part?);
         }
-        Ok(shapes)
+        let closed = self.closed(&parts, posed);
+        let made = parts.into_iter().zip(jobs).enumerate();
+        Ok(made
+            .map(|(i, (part, job))| {
+                Some(match part? {
+                    Part::Mesh(m) => Made {
+                        solid: self.open_too || closed.contains(&i),
+                        shape: self.builder.add_mesh(m, &job.name),
+                    },
+                    Part::Spheres(s) => Made {
+                        solid: true,
+                        shape: self.builder.add_spheres(s, &job.name),
+                    },
+                })
+            })
+            .collect())
+    }
+
+    /// Which of the primitives that glass covers enclose a volume by themselves; notes of the
+    /// posed meshes with other glass whether they do as a whole.
+    fn closed(&self, parts: &[Option<Part>], posed: &mut [Posed<'a>]) -> HashSet<usize> {
+        let mesh = |job: usize| match &parts[job] {
+            Some(Part::Mesh(m)) => Some(m),
+            _ => None,
+        };
+        let mut known: HashMap<usize, bool> = HashMap::new();
+        if self.open_too {
+            return HashSet::new();
+        }
+        for p in posed {
+            let glass = p.parts.iter().filter(|(_, m)| self.solid.contains_key(m));
+            let mut open = false;
+            for &(job, _) in glass {
+                open |= !*known
+                    .entry(job)
+                    .or_insert_with(|| mesh(job).is_none_or(|m| solid::is_closed(&[m])));
+            }
+            if open && p.parts.len() > 1 {
+                let all: Vec<_> = p.parts.iter().filter_map(|&(job, _)| mesh(job)).collect();
+                p.closed = solid::is_closed(&all);
+            }
+        }
+        let closed = known.into_iter().filter(|(_, closed)| *closed);
+        closed.map(|(job, _)| job).collect()
     }
 
     fn place_all(&mut self, u: &Use, posed: &Posed<'a>, shapes: &[Option<Made>]) {
@@ -316,7 +350,7 @@ impl<'a> Walker<'a, '_> {
         }
         for &(job, material) in &posed.parts {
             if let Some(Made { shape, solid }) = shapes[job] {
-                let material = self.solid_or(material, solid);
+                let material = self.solid_or(material, solid || posed.closed);
                 for world in worlds {
                     self.place(shape, material, *world, u.name.clone());
                 }
@@ -357,8 +391,8 @@ impl<'a> Job<'a> {
             skin: posed.skin.as_ref(),
         };
         let mut part = mesh::read(&self.primitive, source, shaping, notes)?;
-        if let (Some(Part::Mesh(m)), Some(set)) = (&mut part, self.tangents)
-            && !tangents::complete(m, set)
+        if let (Some(Part::Mesh(m)), Some(wanted)) = (&mut part, self.tangents)
+            && !tangents::complete(m, wanted)
         {
             notes.add(tangents::CROWDED, 1);
         }

@@ -3,6 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::json::Cursor;
 use crate::geometry::TriangleMesh;
 use crate::materials::MaterialDesc;
 
@@ -18,36 +19,41 @@ pub enum SolidGlass {
     Never,
 }
 
-/// The solid twin of a material, if it is glass that says nothing of a volume.
-pub(super) fn twin(desc: &MaterialDesc) -> Option<MaterialDesc> {
-    (desc.transmission > 0.0 && !desc.volume).then(|| MaterialDesc {
+/// The solid twin of a material, if it is glass that says nothing of a volume. One that says its
+/// thickness is zero is meant to be thin.
+pub(super) fn twin(m: &Cursor<'_>, desc: &MaterialDesc) -> Option<MaterialDesc> {
+    let silent = m.extension("KHR_materials_volume").is_none();
+    (desc.transmission > 0.0 && silent).then(|| MaterialDesc {
         volume: true,
         ..desc.clone()
     })
 }
 
-/// Whether every edge is shared by two triangles of consistent winding. Vertices in one place are
-/// one, as seams of texture coordinates split them; triangles without area do not count.
-pub(super) fn is_closed(mesh: &TriangleMesh) -> bool {
+/// Whether in all `parts` together every edge is shared by two triangles of consistent winding.
+/// Vertices in one place are one, as seams of texture coordinates and changes of material split
+/// them; triangles without area do not count.
+pub(super) fn is_closed(parts: &[&TriangleMesh]) -> bool {
     let mut known = HashMap::new();
-    let welded: Vec<u32> = mesh
-        .positions
-        .iter()
-        .map(|p| {
-            // Adding zero makes one of both zeros.
-            let next = known.len() as u32;
-            *known.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(next)
-        })
-        .collect();
     let mut edges = HashSet::new();
-    for t in &mesh.indices {
-        let [a, b, c] = t.map(|i| welded[i as usize]);
-        if a == b || b == c || c == a {
-            continue;
-        }
-        for edge in [(a, b), (b, c), (c, a)] {
-            if !edges.insert(edge) {
-                return false;
+    for mesh in parts {
+        let welded: Vec<u32> = mesh
+            .positions
+            .iter()
+            .map(|p| {
+                // Adding zero makes one of both zeros.
+                let next = known.len() as u32;
+                *known.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(next)
+            })
+            .collect();
+        for t in &mesh.indices {
+            let [a, b, c] = t.map(|i| welded[i as usize]);
+            if a == b || b == c || c == a {
+                continue;
+            }
+            for edge in [(a, b), (b, c), (c, a)] {
+                if !edges.insert(edge) {
+                    return false;
+                }
             }
         }
     }
@@ -84,19 +90,22 @@ mod tests {
     #[test]
     fn bodies_are_closed_and_panes_and_broken_bodies_are_not() {
         let whole = cube();
-        assert!(is_closed(&whole));
+        assert!(is_closed(&[&whole]));
         let mut degenerate = cube();
         degenerate.indices.push([0, 0, 1]);
-        assert!(is_closed(&degenerate));
+        assert!(is_closed(&[&degenerate]));
         let mut holed = cube();
         holed.indices.pop();
-        assert!(!is_closed(&holed));
+        assert!(!is_closed(&[&holed]));
         let mut flipped = cube();
         flipped.indices[3].swap(0, 1);
-        assert!(!is_closed(&flipped));
+        assert!(!is_closed(&[&flipped]));
         let mut doubled = cube();
         doubled.indices.push(doubled.indices[0]);
-        assert!(!is_closed(&doubled));
-        assert!(!is_closed(&TriangleMesh::default()));
+        assert!(!is_closed(&[&doubled]));
+        assert!(!is_closed(&[&TriangleMesh::default()]) && !is_closed(&[]));
+        let (mut lower, mut upper) = (cube(), cube());
+        upper.indices = lower.indices.split_off(5);
+        assert!(is_closed(&[&lower, &upper]) && !is_closed(&[&lower]) && !is_closed(&[&upper]));
     }
 }

@@ -10,8 +10,17 @@ use super::json::Cursor;
 use crate::geometry::TriangleMesh;
 use crate::math::Vec3;
 
-/// The set of texture coordinates along which a material wants tangents; `None` if it needs none.
-pub(super) fn wanted(material: &Cursor<'_>) -> Result<Option<usize>, Problem> {
+/// Along what a material wants tangents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Wanted {
+    /// The set of texture coordinates.
+    set: usize,
+    /// Without these, around the vertical axis: only anisotropy can do with that.
+    around: bool,
+}
+
+/// Along what a material wants tangents; `None` if it needs none.
+pub(super) fn wanted(material: &Cursor<'_>) -> Result<Option<Wanted>, Problem> {
     let coat = material.extension("KHR_materials_clearcoat");
     let anisotropy = material.extension("KHR_materials_anisotropy");
     let slots = [
@@ -20,13 +29,17 @@ pub(super) fn wanted(material: &Cursor<'_>) -> Result<Option<usize>, Problem> {
         anisotropy.as_ref().and_then(|e| e.get("anisotropyTexture")),
     ];
     let Some(info) = slots.into_iter().flatten().next() else {
-        return Ok(anisotropy.map(|_| 0));
+        return Ok(anisotropy.map(|_| Wanted {
+            set: 0,
+            around: true,
+        }));
     };
     let own = info.index_or("texCoord", 0)?;
-    match info.extension("KHR_texture_transform") {
-        Some(e) => e.index_or("texCoord", own).map(Some),
-        None => Ok(Some(own)),
-    }
+    let set = match info.extension("KHR_texture_transform") {
+        Some(e) => e.index_or("texCoord", own)?,
+        None => own,
+    };
+    Ok(Some(Wanted { set, around: false }))
 }
 
 /// Most triangles around one vertex. The library's time grows with their square and its stack
@@ -37,14 +50,19 @@ const MAX_FAN: u32 = 1024;
 pub(super) const CROWDED: &str =
     "meshes with more than 1024 triangles around a vertex get their tangents triangle by triangle";
 
-/// Gives a mesh without tangents those of MikkTSpace along texture coordinates `set`. Vertices
+/// Gives a mesh without tangents those of MikkTSpace along its texture coordinates. Vertices
 /// are split where their triangles disagree, and nowhere else. Nothing happens to a mesh that
-/// has tangents or lacks the coordinates. `false` if too many triangles share a vertex: such a
+/// has tangents, or lacks the coordinates where nothing else serves. `false` if too many triangles share a vertex: such a
 /// mesh stays without.
-pub(super) fn complete(mesh: &mut TriangleMesh, set: usize) -> bool {
+pub(super) fn complete(mesh: &mut TriangleMesh, wanted: Wanted) -> bool {
     let n = mesh.positions.len();
+    let Wanted { set, around } = wanted;
     let fits = |attribute: usize| attribute == 0 || attribute == n;
     let has_set = mesh.uv_sets.get(set).is_some_and(|s| s.len() == n);
+    if around && mesh.tangents.is_empty() && mesh.uv_sets.is_empty() {
+        mesh.tangents = around_vertical(&mesh.positions);
+        return true;
+    }
     if !mesh.tangents.is_empty() || !has_set || !fits(mesh.normals.len()) || n == 0 {
         return true;
     }
@@ -69,6 +87,24 @@ pub(super) fn complete(mesh: &mut TriangleMesh, set: usize) -> bool {
         split(mesh, &faces, &tangents);
     }
     done
+}
+
+/// Tangents around the `y` axis through the middle of the mesh's box, counter-clockwise seen from
+/// above: what Cycles takes where a mesh has no texture coordinates, and the specification has
+/// nothing for.
+fn around_vertical(positions: &[[f32; 3]]) -> Vec<[f32; 4]> {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for p in positions.iter().map(|p| Vec3::from(*p)) {
+        (low, high) = (low.min(p), high.max(p));
+    }
+    let (middle, extent) = (0.5 * (low + high), high - low);
+    let tangent = |p: &[f32; 3]| {
+        let r = (Vec3::from(*p) - middle) / extent;
+        let t = Vec3::new(r.z, 0.0, -r.x).try_normalize();
+        let [x, y, z] = t.unwrap_or(Vec3::X).to_array();
+        [x, y, z, 1.0]
+    };
+    positions.iter().map(tangent).collect()
 }
 
 /// Writes a tangent per corner into the vertices.
@@ -198,6 +234,10 @@ mod tests {
 
     use super::*;
 
+    fn along(set: usize) -> Wanted {
+        Wanted { set, around: false }
+    }
+
     /// A square in the plane of x and y, facing z, whose texture runs along x and, as images do,
     /// down y; mirrored on request.
     fn square(mirrored: bool) -> TriangleMesh {
@@ -216,18 +256,41 @@ mod tests {
     fn tangents_follow_u_and_the_second_axis_goes_up_the_image() {
         for (mirrored, expected) in [(false, [1., 0., 0., 1.]), (true, [-1., 0., 0., -1.])] {
             let mut mesh = square(mirrored);
-            complete(&mut mesh, 1);
+            complete(&mut mesh, along(1));
             assert_eq!(mesh.tangents, vec![expected; 4]);
             assert_eq!(mesh.indices, square(mirrored).indices);
         }
         // Without the coordinates, or with tangents of its own, a mesh stays as it is.
         let mut mesh = square(false);
-        complete(&mut mesh, 0);
-        complete(&mut mesh, 7);
+        complete(&mut mesh, along(0));
+        complete(&mut mesh, along(7));
         assert!(mesh.tangents.is_empty());
         mesh.tangents = vec![[0., 1., 0., 1.]; 4];
-        complete(&mut mesh, 1);
+        complete(&mut mesh, along(1));
         assert_eq!(mesh.tangents, vec![[0., 1., 0., 1.]; 4]);
+    }
+
+    #[test]
+    fn without_coordinates_brushing_goes_around_the_vertical() {
+        let around = Wanted {
+            set: 0,
+            around: true,
+        };
+        // Seen from above, a turn counter-clockwise takes +x by way of -z to -x.
+        let mut mesh = TriangleMesh {
+            positions: vec![[9., 1., 0.], [7., 1., 0.], [8., 5., 2.], [8., 5., -2.]],
+            indices: vec![[0, 1, 2]],
+            ..Default::default()
+        };
+        assert!(complete(&mut mesh, around));
+        let [a, b, c, d] = [[0., -1.], [0., 1.], [1., 0.], [-1., 0.]];
+        let expected = [a, b, c, d].map(|[x, z]| [x, 0.0, z, 1.0]);
+        assert_eq!(mesh.tangents, expected);
+        // Where there are coordinates, these go before.
+        let mut mesh = square(false);
+        mesh.uv_sets.swap(0, 1);
+        assert!(complete(&mut mesh, around));
+        assert_eq!(mesh.tangents, vec![[1., 0., 0., 1.]; 4]);
     }
 
     #[test]
@@ -246,7 +309,7 @@ mod tests {
             ],
             ..Default::default()
         };
-        complete(&mut mesh, 0);
+        complete(&mut mesh, along(0));
         assert_eq!(mesh.positions.len(), 8, "the two vertices of the seam");
         assert_eq!(mesh.normals.len(), 8);
         assert_eq!(mesh.uv_sets[0].len(), 8);
@@ -292,7 +355,7 @@ mod tests {
         };
         let count = mesh.positions.len();
         let start = std::time::Instant::now();
-        complete(&mut mesh, 0);
+        complete(&mut mesh, along(0));
         println!("{} triangles: {:?}", mesh.indices.len(), start.elapsed());
         assert_eq!((mesh.positions.len(), mesh.tangents.len()), (count, count));
         for (t, n) in mesh.tangents.iter().zip(&mesh.normals) {
@@ -314,9 +377,9 @@ mod tests {
             indices: (1..n as u32).map(|i| [0, i, i + 1]).collect(),
             ..Default::default()
         };
-        assert!(!complete(&mut mesh, 0) && mesh.tangents.is_empty());
+        assert!(!complete(&mut mesh, along(0)) && mesh.tangents.is_empty());
         mesh.indices.truncate(1000);
-        assert!(complete(&mut mesh, 0) && !mesh.tangents.is_empty());
+        assert!(complete(&mut mesh, along(0)) && !mesh.tangents.is_empty());
     }
 
     #[test]
@@ -325,16 +388,20 @@ mod tests {
         assert_eq!(set(json!({})), None);
         assert_eq!(
             set(json!({"normalTexture": {"index": 0, "texCoord": 2}})),
-            Some(2)
+            Some(along(2))
         );
         let moved = json!({"normalTexture": {"index": 0, "texCoord": 2,
             "extensions": {"KHR_texture_transform": {"texCoord": 1}}}});
-        assert_eq!(set(moved), Some(1));
+        assert_eq!(set(moved), Some(along(1)));
         let coat = json!({"extensions": {"KHR_materials_clearcoat":
             {"clearcoatNormalTexture": {"index": 0, "texCoord": 3}}}});
-        assert_eq!(set(coat), Some(3));
+        assert_eq!(set(coat), Some(along(3)));
         let brushed = json!({"extensions": {"KHR_materials_anisotropy": {}}});
-        assert_eq!(set(brushed), Some(0));
+        let around = Wanted {
+            set: 0,
+            around: true,
+        };
+        assert_eq!(set(brushed), Some(around));
     }
 
     proptest! {
@@ -357,7 +424,7 @@ mod tests {
                 ..Default::default()
             };
             let before = mesh.clone();
-            complete(&mut mesh, 0);
+            complete(&mut mesh, along(0));
             prop_assert_eq!(mesh.tangents.len(), mesh.positions.len());
             prop_assert_eq!(mesh.uv_sets[0].len(), mesh.positions.len());
             for (a, b) in before.indices.iter().flatten().zip(mesh.indices.iter().flatten()) {

@@ -6,6 +6,7 @@
 
 mod area;
 mod ball;
+mod cube;
 mod desc;
 mod directional;
 mod ellipsoid;
@@ -18,6 +19,7 @@ mod sky;
 mod sphere;
 mod spot;
 
+pub use cube::CubeMap;
 pub use desc::{EmissionMap, LightDesc, SpotCurve};
 pub use parallelogram::Parallelogram;
 pub use sky::SkyImage;

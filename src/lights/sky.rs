@@ -84,7 +84,7 @@ fn coordinates(d: DVec3) -> (f64, f64) {
 }
 
 /// The direction at image coordinates.
-fn direction(u: f64, v: f64) -> DVec3 {
+pub(super) fn direction(u: f64, v: f64) -> DVec3 {
     let (s, c) = ((u - 0.5) * TAU).sin_cos();
     let (sin, cos) = (v * PI).sin_cos();
     DVec3::new(sin * c, cos, sin * s)
