@@ -12,7 +12,7 @@ use super::{BATCH, Integrator, Sample, Scratch, Spacing};
 use crate::cameras::Camera;
 use crate::control::Control;
 use crate::film::{Film, PixelSample, Tile};
-use crate::sampling::{Sampler, stream};
+use crate::sampling::{Sequence, stream};
 use crate::stats::RayCounts;
 
 /// Edge of a tile in pixels.
@@ -45,23 +45,41 @@ pub(super) struct View<'a> {
     pub(super) width: u32,
 }
 
+/// A pixel whose samples are taken.
+pub(super) struct Pixel<'a> {
+    view: &'a View<'a>,
+    corner: [f64; 2],
+    sequence: Sequence,
+}
+
 impl View<'_> {
-    /// Sample `number` of a pixel, to be added to sum `sum`.
-    #[inline(always)]
-    pub(super) fn sample(&self, [px, py]: [u32; 2], number: u32, sum: usize) -> Sample {
+    pub(super) fn pixel(&self, [px, py]: [u32; 2]) -> Pixel<'_> {
         let key = u64::from(py) * u64::from(self.width) + u64::from(px);
-        let mut sampler = Sampler::new(self.seed, stream::CAMERA, key, u64::from(number));
+        Pixel {
+            view: self,
+            corner: [f64::from(px), f64::from(py)],
+            sequence: Sequence::new(self.seed, stream::CAMERA, key),
+        }
+    }
+}
+
+impl Pixel<'_> {
+    /// Its sample `number`, to be added to sum `sum`.
+    #[inline(always)]
+    pub(super) fn sample(&self, number: u32, sum: usize) -> Sample {
+        let view = self.view;
+        let mut sampler = self.sequence.point(u64::from(number));
         let [jx, jy] = sampler.next_2d();
-        let (x, y) = (f64::from(px) + jx, f64::from(py) + jy);
-        let lens = if self.camera.has_lens() {
+        let (x, y) = (self.corner[0] + jx, self.corner[1] + jy);
+        let lens = if view.camera.has_lens() {
             sampler.next_2d()
         } else {
             [0.5; 2]
         };
         Sample {
-            camera: self
+            camera: view
                 .spacing
-                .camera_ray(self.camera, x, y, lens, self.differentials),
+                .camera_ray(view.camera, x, y, lens, view.differentials),
             sampler,
             pixel: sum,
         }
@@ -138,8 +156,9 @@ pub fn camera_pass(
                         if batch.len() + samples as usize > BATCH {
                             take(&mut batch);
                         }
+                        let own = view.pixel([px, py]);
                         for s in first..first + samples {
-                            batch.push(view.sample([px, py], s, pixel));
+                            batch.push(own.sample(s, pixel));
                             if batch.is_full() {
                                 take(&mut batch);
                             }

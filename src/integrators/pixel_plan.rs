@@ -216,8 +216,9 @@ fn take(
                 let mut scratch = Scratch::default();
                 let mut sums = vec![PixelSample::default(); n as usize];
                 let mut batch = ArrayVec::<Sample, BATCH>::new();
+                let own = view.pixel([px, py]);
                 for s in 0..n {
-                    batch.push(view.sample([px, py], first + s, s as usize));
+                    batch.push(own.sample(first + s, s as usize));
                     if batch.is_full() || s + 1 == n {
                         integrator.sample(&mut batch, &mut sums, &mut scratch);
                         batch.clear();

@@ -10,4 +10,4 @@ pub mod warp;
 
 pub use discrete::Discrete;
 pub use rng::{Rng, hash2};
-pub use sampler::{Sampler, stream};
+pub use sampler::{Sampler, Sequence, stream};

@@ -39,18 +39,49 @@ pub struct Sampler {
     rng: Rng,
 }
 
+/// A sequence of sample points, for whoever takes many of one.
+#[derive(Clone, Copy, Debug)]
+pub struct Sequence {
+    run: u64,
+    key: u64,
+    /// Key of the first 2³² points.
+    first: u64,
+}
+
+impl Sequence {
+    /// The sequence named by (`seed`, `stream`, `key`).
+    #[inline]
+    pub fn new(seed: u64, stream: u64, key: u64) -> Self {
+        let run = hash2(seed, stream);
+        Self {
+            run,
+            key,
+            first: hash2(run, hash2(key, 0)),
+        }
+    }
+
+    /// Its point `index`.
+    #[inline(always)]
+    pub fn point(&self, index: u64) -> Sampler {
+        // It has 2³² points; a longer run goes on in an independent one.
+        let key = match index >> 32 {
+            0 => self.first,
+            part => hash2(self.run, hash2(self.key, part)),
+        };
+        Sampler {
+            key,
+            reversed: (index as u32).reverse_bits(),
+            pair: 0,
+            rng: Rng::new(hash2(key, index.wrapping_add(0x5851_f42d_4c95_7f2d))),
+        }
+    }
+}
+
 impl Sampler {
     /// Point `index` of the sequence named by (`seed`, `stream`, `key`).
     #[inline]
     pub fn new(seed: u64, stream: u64, key: u64, index: u64) -> Self {
-        // The sequence has 2³² points; a longer run goes on in an independent one.
-        let sequence = hash2(hash2(seed, stream), hash2(key, index >> 32));
-        Self {
-            key: sequence,
-            reversed: (index as u32).reverse_bits(),
-            pair: 0,
-            rng: Rng::new(hash2(sequence, index.wrapping_add(0x5851_f42d_4c95_7f2d))),
-        }
+        Sequence::new(seed, stream, key).point(index)
     }
 
     /// Next point of the unit square.
