@@ -128,7 +128,7 @@ impl SurfacePoint {
     }
 
     /// The position, moved off the surface to the side that `d` points to.
-    #[inline]
+    #[inline(always)]
     pub fn offset_toward(&self, d: DVec3) -> DVec3 {
         let side = if d.dot(self.ng) >= 0.0 {
             self.offset

@@ -195,7 +195,7 @@ impl Scene {
 
     /// Share of the light that survives the segment of a ray that ended at `sp`, if it ran
     /// inside an absorbing body (Beer–Lambert).
-    #[inline]
+    #[inline(always)]
     pub fn transmittance(&self, sp: &SurfacePoint, crossing: &Crossing) -> Option<Rgb> {
         if let Some(media) = &self.media
             && (media.knows(sp.object) || crossing.beyond(false) != Inside::default())
@@ -205,6 +205,12 @@ impl Scene {
         if sp.front {
             return None;
         }
+        self.interior_transmittance(sp)
+    }
+
+    /// The rare part of the above, kept out of the loops that it is asked from.
+    #[inline(never)]
+    fn interior_transmittance(&self, sp: &SurfacePoint) -> Option<Rgb> {
         let interior = self.material(sp.material).interior()?;
         Some(interior.transmittance(sp.distance))
     }
