@@ -14,8 +14,8 @@ use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
 use crate::film::{Channel, Component, Film, Layer};
 use crate::integrators::{
-    IntegratorSettings, PixelPlan, Region, RenderContext, Spacing, Visibility, camera_pass,
-    guarded, planned_camera_pass,
+    IntegratorSettings, PhotonNeeds, PixelPlan, Region, RenderContext, Spacing, Visibility,
+    camera_pass, guarded, planned_camera_pass,
 };
 use crate::photons::{PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons};
 use crate::plugins::Registry;
@@ -189,16 +189,20 @@ fn render_in_pool(
 
     let first = PhotonSettings {
         seed: options.seed,
-        global: options.photons,
+        global: match integrator.photons {
+            PhotonNeeds::All => options.photons,
+            PhotonNeeds::None | PhotonNeeds::Caustic => 0,
+        },
         caustic: options.caustic_photons,
         nearest: options.nearest,
         max_depth: options.max_depth,
         roulette: options.roulette,
     };
-    let wanted = integrator.photons
-        && effects
-            .set
-            .intersects(EffectSet::CAUSTICS | EffectSet::INDIRECT);
+    let wanted = effects.set.intersects(match integrator.photons {
+        PhotonNeeds::None => EffectSet::empty(),
+        PhotonNeeds::Caustic => EffectSet::CAUSTICS,
+        PhotonNeeds::All => EffectSet::CAUSTICS | EffectSet::INDIRECT,
+    });
     let mut film = match session.film {
         Some(film) if (film.width(), film.height()) == (settings.width, settings.height) => film,
         Some(_) => {
@@ -256,7 +260,7 @@ fn render_in_pool(
             samples = samples.min(pass.samples);
         }
         if wanted {
-            let gather = options.gather_rays > 0;
+            let gather = options.gather_rays > 0 || integrator.photons == PhotonNeeds::Caustic;
             maps = trace_photons(
                 scene,
                 &*accel,

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::mesh::COORDINATE_LIMIT;
 use super::{
     Coverage, Hit, Invalid, LightId, MaterialId, ObjectId, Ray, ShapeId, SurfacePoint, TriangleMesh,
@@ -82,6 +84,46 @@ impl Shape {
             Self::Spheres(s) => s.bounds(),
         }
     }
+
+    /// Sphere around it, in its own space: about the middle of its box, through what lies farthest
+    /// from there. That of a single sphere is the sphere. Without size if there is nothing.
+    pub fn bounding_sphere(&self) -> BoundingSphere {
+        let bounds = self.bounds();
+        if bounds.is_empty() {
+            return BoundingSphere {
+                center: DVec3::ZERO,
+                radius: 0.0,
+            };
+        }
+        let center = bounds.center();
+        let radius = match self {
+            Self::Mesh(m) => {
+                let far = |i: &u32| {
+                    (Vec3::from(m.positions[*i as usize]).as_dvec3() - center).length_squared()
+                };
+                let far = m.indices.par_iter().flatten_iter().map(far);
+                far.reduce(|| 0.0, f64::max).sqrt()
+            }
+            Self::Spheres(s) => (0..s.spheres.len() as u32)
+                .map(|i| {
+                    let (c, r) = s.get(i);
+                    (c - center).length() + r
+                })
+                .fold(0.0, f64::max),
+        };
+        BoundingSphere { center, radius }
+    }
+}
+
+/// Bound on how much longer a linear map can make a vector; what it is for a turn with even scale.
+fn stretch(m: &glam::DMat3) -> f64 {
+    // The root of the largest row of |MᵀM|, which holds its largest eigenvalue.
+    let square = m.transpose() * *m;
+    let row = |c: DVec3| c.abs().element_sum();
+    row(square.x_axis)
+        .max(row(square.y_axis))
+        .max(row(square.z_axis))
+        .sqrt()
 }
 
 /// A shape placed in the world, with its material.
@@ -192,17 +234,23 @@ impl Geometry {
         out
     }
 
-    /// World-space sphere around an object; exact for a single sphere that is placed in world
-    /// space.
-    pub fn object_bounding_sphere(&self, id: ObjectId) -> BoundingSphere {
-        let object = self.object(id);
-        match (self.shape(object.shape), &object.placement) {
-            (Shape::Spheres(set), None) if set.spheres.len() == 1 => {
-                let (center, radius) = set.get(0);
-                BoundingSphere { center, radius }
-            }
-            _ => self.object_bounds(id).bounding_sphere(),
-        }
+    /// World-space spheres around all objects. A mesh has its vertices to go by, not the corners of
+    /// its box, which make the sphere around a ball `√3` times too wide.
+    pub fn bounding_spheres(&self) -> Vec<BoundingSphere> {
+        let own: Vec<BoundingSphere> = self.shapes.par_iter().map(Shape::bounding_sphere).collect();
+        self.objects
+            .par_iter()
+            .map(|object| {
+                let sphere = own[object.shape.index()];
+                match &object.placement {
+                    None => sphere,
+                    Some(place) => BoundingSphere {
+                        center: place.world_from_object.transform_point3(sphere.center),
+                        radius: sphere.radius * stretch(&place.world_from_object.matrix3),
+                    },
+                }
+            })
+            .collect()
     }
 
     /// World-space box of everything.

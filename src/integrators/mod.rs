@@ -4,6 +4,7 @@
 mod camera_pass;
 mod footprint;
 mod gather;
+mod hybrid;
 mod light_sampling;
 mod path;
 mod photon;
@@ -109,6 +110,17 @@ pub struct Scratch {
     pub nearest: crate::photons::map::Nearest,
 }
 
+/// Which photons an integrator has use for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhotonNeeds {
+    /// None: it follows paths from the camera alone.
+    None,
+    /// Those that come by way of specular surfaces.
+    Caustic,
+    /// All.
+    All,
+}
+
 /// An integrator that can be chosen.
 #[derive(Clone, Copy, Debug)]
 pub struct IntegratorEntry {
@@ -116,8 +128,8 @@ pub struct IntegratorEntry {
     pub name: &'static str,
     /// One sentence.
     pub doc: &'static str,
-    /// Whether it reads photon maps.
-    pub photons: bool,
+    /// Which photon maps it reads.
+    pub photons: PhotonNeeds,
     /// Makes it.
     pub build: for<'a> fn(RenderContext<'a>) -> Box<dyn Integrator + 'a>,
 }
@@ -125,4 +137,4 @@ pub struct IntegratorEntry {
 crate::registry::impl_entry!(IntegratorEntry, "integrator");
 
 /// The integrators; the first is the default.
-pub static INTEGRATORS: &[IntegratorEntry] = &[photon::ENTRY, path::ENTRY];
+pub static INTEGRATORS: &[IntegratorEntry] = &[photon::ENTRY, hybrid::ENTRY, path::ENTRY];

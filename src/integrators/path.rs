@@ -1,5 +1,5 @@
 //! `path`: unbiased path tracing with next-event estimation and multiple importance sampling;
-//! the reference for everything else.
+//! the reference for everything else. With photons it is `hybrid`, which see.
 //!
 //! Source: Kajiya, *The Rendering Equation*, 1986; Veach 1997, chapters 8 to 10.
 
@@ -7,7 +7,8 @@ use arrayvec::ArrayVec;
 
 use super::footprint::Trail;
 use super::light_sampling::{View, power_heuristic, sample_direct};
-use super::{BATCH, Integrator, IntegratorEntry, RenderContext, Sample, Scratch};
+use super::stored_light::{Stored, sites};
+use super::{BATCH, Integrator, IntegratorEntry, PhotonNeeds, RenderContext, Sample, Scratch};
 use crate::color::Rgb;
 use crate::film::{Component, PixelSample};
 use crate::geometry::{Differential, Ray, SurfacePoint};
@@ -23,6 +24,9 @@ const ROULETTE_DEPTH: u32 = 3;
 /// that still carry much makes the rest of them bright: in the box, roulette by the throughput
 /// itself triples the error at equal samples.
 const ROULETTE_WEIGHT: f64 = 0.1;
+
+/// How often the glow map is asked at diffuse surfaces after the first.
+const LATER_GLOW: f64 = 0.25;
 
 /// Longest path when neither roulette nor the user ends it.
 const DEPTH_GUARD: u32 = 4096;
@@ -68,8 +72,9 @@ impl Walk {
     }
 }
 
-struct Path<'a> {
-    cx: RenderContext<'a>,
+/// `PHOTONS`: whether `D S⁺ L` comes from photon maps.
+pub(super) struct Path<'a, const PHOTONS: bool> {
+    pub(super) cx: RenderContext<'a>,
 }
 
 /// A path on its way.
@@ -80,6 +85,10 @@ struct Walker {
     sampler: Sampler,
     beta: Rgb,
     walk: Walk,
+    /// Diffuse surfaces that it has left.
+    left_diffuse: u32,
+    /// Whether a specular surface came after the last of them: light found now ends `D S⁺ L`.
+    focused: bool,
     /// Density and origin of the last BSDF sample; none for a delta lobe or the camera.
     last: Option<(f64, DVec3)>,
     /// Index of the sum that it adds to.
@@ -95,6 +104,8 @@ impl Walker {
             sampler: sample.sampler.clone(),
             beta: Rgb::ONE,
             walk: Walk::Camera,
+            left_diffuse: 0,
+            focused: false,
             last: None,
             pixel: sample.pixel,
         }
@@ -109,7 +120,7 @@ struct Direct {
     pixel: usize,
 }
 
-impl Integrator for Path<'_> {
+impl<const PHOTONS: bool> Integrator for Path<'_, PHOTONS> {
     fn sample(&self, batch: &mut [Sample], sums: &mut [PixelSample], scratch: &mut Scratch) {
         for batch in batch.chunks(BATCH) {
             self.walk(batch, sums, scratch);
@@ -117,7 +128,7 @@ impl Integrator for Path<'_> {
     }
 }
 
-impl Path<'_> {
+impl<const PHOTONS: bool> Path<'_, PHOTONS> {
     /// Walks several paths, each step of all of them together: shading is a long chain of
     /// dependent operations, and the processor works on those of several paths at a time if no
     /// search lies between them.
@@ -142,8 +153,9 @@ impl Path<'_> {
             let mut met = points.iter();
             alive.retain(|&mut i| {
                 let w = &mut walkers[i];
+                let sum = &mut sums[w.pixel];
                 met.next()
-                    .is_some_and(|sp| self.scatter(depth, w, sp, &mut sums[w.pixel], &mut lights))
+                    .is_some_and(|sp| self.scatter(depth, w, sp, sum, &mut lights, scratch))
             });
             scratch.rays.shadow += lights.len() as u64;
             scratch.rays.bounce += alive.len() as u64;
@@ -168,6 +180,9 @@ impl Path<'_> {
 
     /// Takes the light from beyond the scene that a path has met.
     fn escape(&self, depth: u32, w: &Walker, out: &mut PixelSample) {
+        if PHOTONS && w.focused {
+            return;
+        }
         let radiance = View::of_path(depth, w.last).escaped(&self.cx, &w.ray);
         out.add(w.walk.component(), w.beta * radiance);
     }
@@ -183,9 +198,11 @@ impl Path<'_> {
         sp: &SurfacePoint,
         out: &mut PixelSample,
         lights: &mut ArrayVec<Direct, BATCH>,
+        scratch: &mut Scratch,
     ) -> bool {
         let cx = &self.cx;
-        if !cx.scene.bodiless().is_empty() {
+        let counts = !(PHOTONS && w.focused);
+        if counts && !cx.scene.bodiless().is_empty() {
             let seen = View::of_path(depth, w.last).crossed(cx, &w.ray, sp.distance);
             out.add(w.walk.component(), w.beta * seen);
         }
@@ -199,7 +216,7 @@ impl Path<'_> {
             out.position += sp.p + cx.scene.center;
             out.depth += sp.distance;
         }
-        if sp.light.is_some() {
+        if counts && sp.light.is_some() {
             let le = cx.scene.emitted(sp, trail.footprint());
             if !le.is_black() {
                 let weight = w.last.map_or(1.0, |(pdf, from)| {
@@ -211,6 +228,9 @@ impl Path<'_> {
         if let Some(matte) = cx.scene.matte(sp) {
             if depth == 0 {
                 out.albedo += matte.reflected_albedo();
+            }
+            if PHOTONS {
+                self.stored(w, sp, &matte, out, scratch);
             }
             return self.turn(depth, w, sp, &trail, &matte, lights);
         }
@@ -226,7 +246,43 @@ impl Path<'_> {
             }
             return false;
         }
+        if PHOTONS && bsdf.has_diffuse() {
+            self.stored(w, sp, &bsdf, out, scratch);
+        }
         self.turn(depth, w, sp, &trail, &bsdf, lights)
+    }
+
+    /// Takes what the photon maps hold for the diffuse lobes at a point.
+    fn stored(
+        &self,
+        w: &mut Walker,
+        sp: &SurfacePoint,
+        bsdf: &impl Scattering,
+        out: &mut PixelSample,
+        scratch: &mut Scratch,
+    ) {
+        let stored = Stored::new(&self.cx);
+        let sites = sites(sp, bsdf);
+        let (near, far) = match w.walk {
+            Walk::Specular => (Component::Specular, Component::Specular),
+            _ => (Component::Caustics, Component::Indirect),
+        };
+        let mut beta = w.beta;
+        if w.left_diffuse == 0 {
+            if let Some(map) = &self.cx.maps.caustic {
+                let e = stored.density(map, &sites, bsdf, |_| true, scratch);
+                out.add(near, beta * e.value);
+                out.photons[1] += e.density;
+            }
+        } else {
+            // What is stored here is the glow of the surface before. And the glow of this one is
+            // faint and smooth, but takes as long to find.
+            if w.sampler.next_1d() >= LATER_GLOW {
+                return;
+            }
+            beta = beta / LATER_GLOW;
+        }
+        out.add(far, beta * stored.glow(&sites, bsdf));
     }
 
     /// Asks for light from elsewhere, and turns the path into a new direction. Whether it goes
@@ -247,7 +303,10 @@ impl Path<'_> {
         }
         if bsdf.has_finite() {
             let u = w.sampler.next_2d();
-            if let Some(direct) = sample_direct(cx, sp, bsdf, u, 1.0, 1.0) {
+            if let Some(mut direct) = sample_direct(cx, sp, bsdf, u, 1.0, 1.0) {
+                if PHOTONS && w.left_diffuse > 0 {
+                    direct.value.glossy = Rgb::ZERO;
+                }
                 lights.push(Direct {
                     ray: direct.ray,
                     value: direct.value * w.beta,
@@ -262,6 +321,11 @@ impl Path<'_> {
         };
         w.beta *= s.weight;
         w.walk = w.walk.after(s.class);
+        if PHOTONS {
+            let diffuse = s.class == LobeClass::Diffuse;
+            w.left_diffuse += u32::from(diffuse);
+            w.focused = !diffuse && w.left_diffuse > 0;
+        }
         w.last = (s.class != LobeClass::Delta).then_some((s.pdf, sp.p));
         if cx.settings.roulette && depth + 1 >= ROULETTE_DEPTH {
             let survive = (w.beta.max_channel() / ROULETTE_WEIGHT).min(1.0);
@@ -288,6 +352,6 @@ impl Path<'_> {
 pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "path",
     doc: "unbiased path tracing with next-event estimation and MIS: the reference",
-    photons: false,
-    build: |cx| Box::new(Path { cx }),
+    photons: PhotonNeeds::None,
+    build: |cx| Box::new(Path::<false> { cx }),
 };

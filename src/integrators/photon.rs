@@ -13,7 +13,7 @@
 
 use super::footprint::Trail;
 use super::light_sampling::{View, power_heuristic, sample_direct};
-use super::{Integrator, IntegratorEntry, RenderContext, Sample, Scratch};
+use super::{Integrator, IntegratorEntry, PhotonNeeds, RenderContext, Sample, Scratch};
 use arrayvec::ArrayVec;
 
 use crate::color::Rgb;
@@ -240,6 +240,6 @@ impl PhotonMapping<'_> {
 pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "photon",
     doc: "photon mapping: direct light by shadow rays, caustics and indirect light from photons",
-    photons: true,
+    photons: PhotonNeeds::All,
     build: |cx| Box::new(PhotonMapping { cx }),
 };

@@ -28,7 +28,7 @@ pub(super) struct Finder<'a> {
     accel: &'a dyn Accelerator,
     camera: &'a dyn Camera,
     image: [f64; 2],
-    patches: ScenePatches,
+    patches: &'a ScenePatches,
     casters: Vec<Caster>,
 }
 
@@ -60,7 +60,7 @@ impl<'a> Finder<'a> {
             accel,
             camera,
             image: [f64::from(width), f64::from(height)],
-            patches: ScenePatches::new(&scene.geometry),
+            patches: scene.patches(),
             casters: casters(scene, false),
         }
     }

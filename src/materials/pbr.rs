@@ -17,6 +17,7 @@ struct Pbr {
     textures: Option<Arc<TextureSlots>>,
     vertex_colors: bool,
     interior: Option<Interior>,
+    traits: MaterialTraits,
 }
 
 impl Material for Pbr {
@@ -54,7 +55,7 @@ impl Material for Pbr {
     }
 
     fn traits(&self) -> MaterialTraits {
-        self.values.traits()
+        self.traits
     }
 
     fn interior(&self) -> Option<Interior> {
@@ -63,17 +64,25 @@ impl Material for Pbr {
 }
 
 fn build(d: &MaterialDesc) -> Result<Box<dyn Material>, String> {
-    if d.transmission > 0.0 && d.metallic < 1.0 && !(d.ior >= 1.0) {
+    let values = Values::from(d);
+    // What textures leave of the factors: a metalness of 1 says nothing where an image has 0.
+    let bounds = match &d.textures {
+        None => [values; 2],
+        Some(textures) => textures.bounds(&values),
+    };
+    let traits = Values::traits(&bounds);
+    if traits.transmits && !(d.ior >= 1.0) {
         return Err(format!(
             "ior {} is below 1; a transmitting material needs 1 or more",
             d.ior
         ));
     }
     Ok(Box::new(Pbr {
-        values: d.into(),
+        values,
         textures: d.textures.clone(),
         vertex_colors: d.vertex_colors,
-        interior: interior(d),
+        interior: interior(d, bounds[0].metallic),
+        traits,
     }))
 }
 

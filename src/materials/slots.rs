@@ -77,8 +77,24 @@ fn rgb(t: [f64; 4]) -> Rgb {
 impl TextureSlots {
     /// `values` multiplied by what the textures say at a point.
     pub(super) fn evaluate(&self, values: &Values, at: &Surface<'_>) -> Values {
+        self.apply(values, |t| t.sample(at))
+    }
+
+    /// The least and the largest that each of `values` can become, save the angle of anisotropy.
+    pub(super) fn bounds(&self, values: &Values) -> [Values; 2] {
+        let [mut low, mut high] = [0, 1].map(|end| self.apply(values, |t| t.range()[end]));
+        if self.specular_glossiness.is_some() {
+            // More gloss is less roughness.
+            std::mem::swap(&mut low.roughness, &mut high.roughness);
+        }
+        [low, high]
+    }
+
+    /// `values` multiplied by what `lookup` says of each texture.
+    #[inline]
+    fn apply(&self, values: &Values, lookup: impl Fn(&Texture) -> [f64; 4]) -> Values {
         let mut v = *values;
-        let look = |t: &Option<Texture>| t.as_ref().map(|t| t.sample(at));
+        let look = |t: &Option<Texture>| t.as_ref().map(&lookup);
         if let Some(t) = look(&self.base_color).or_else(|| look(&self.diffuse)) {
             v.base_color *= rgb(t);
         }

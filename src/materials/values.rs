@@ -204,21 +204,22 @@ impl Values {
         LayerAlbedo::new(self.roughness, f0.min(1.0), layer.f90.max(f0.min(1.0)), 1.0)
     }
 
-    pub(super) fn traits(&self) -> MaterialTraits {
-        let layer = self.dielectric_layer();
-        let dielectric = 1.0 - self.metallic;
-        let transmits = self.transmission > 0.0 && dielectric > 0.0;
+    /// Of a material whose values lie between `low` and `high`: what it may do anywhere.
+    pub(super) fn traits([low, high]: &[Self; 2]) -> MaterialTraits {
+        let layer = high.dielectric_layer();
+        let dielectric = 1.0 - low.metallic;
+        let transmits = high.transmission > 0.0 && dielectric > 0.0;
         MaterialTraits {
-            diffuse: self.base_color.max_channel() * dielectric * (1.0 - self.transmission)
-                + self.sheen_color.max_channel(),
-            reflects: self.metallic > 0.0
+            diffuse: high.base_color.max_channel() * dielectric * (1.0 - low.transmission)
+                + high.sheen_color.max_channel(),
+            reflects: high.metallic > 0.0
                 || layer.f90 > 0.0
                 || !layer.f0.is_black()
-                || self.clearcoat > 0.0
-                || self.iridescence > 0.0
+                || high.clearcoat > 0.0
+                || high.iridescence > 0.0
                 || transmits,
             transmits,
-            refracts: transmits && self.volume && (self.ior != 1.0 || self.dispersion > 0.0),
+            refracts: transmits && high.volume && (high.ior != 1.0 || high.dispersion > 0.0),
         }
     }
 }
@@ -231,7 +232,8 @@ fn reflection(smooth: bool, ggx: Ggx, fresnel: Fresnel) -> Lobe {
     }
 }
 
-/// The medium that `d` encloses, if its surface can let light in.
-pub(super) fn interior(d: &MaterialDesc) -> Option<Interior> {
-    d.interior().filter(|_| d.metallic < 1.0)
+/// The medium that `d` encloses, if its surface can let light in: if it is not all metal, and its
+/// metalness is `metallic` at least.
+pub(super) fn interior(d: &MaterialDesc, metallic: f64) -> Option<Interior> {
+    d.interior().filter(|_| metallic < 1.0)
 }

@@ -147,7 +147,7 @@ pub fn trace_photons(
         let kernels = Arc::new(deciding.kernels(scout.photons, area, all, control));
         let map = PhotonMap::build(pass.photons, settings.nearest, area);
         maps.caustic = Some(map.with_kernels(kernels));
-        if gather && indirect {
+        if gather && effects.contains(EffectSet::INDIRECT) {
             let kernels = Arc::new(deciding.kernels(scout.glow, area, all, control));
             let glow = PhotonMap::build(pass.glow, settings.nearest, area);
             maps.glow = Some(IrradianceMap::build(&glow, kernels, all, control));

@@ -60,7 +60,7 @@ impl Targets {
                 let t = scene.material(g.object(id).material).traits();
                 t.reflects || t.transmits
             })
-            .map(|id| g.object_bounding_sphere(id))
+            .map(|id| scene.bounding_sphere(id))
             .collect();
         Self {
             spheres: merge(spheres),

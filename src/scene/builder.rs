@@ -244,6 +244,7 @@ impl SceneBuilder {
             center,
             warnings: self.warnings,
             notes: self.notes,
+            found: Default::default(),
         })
     }
 

@@ -13,14 +13,16 @@ pub use census::Census;
 pub use light_choice::LightChoice;
 pub use media::{Crossing, Inside, Media};
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::cameras::CameraDesc;
 use crate::color::Rgb;
-use crate::geometry::{Footprint, Geometry, LightId, MaterialId, Ray, Surface, SurfacePoint};
+use crate::geometry::{
+    Footprint, Geometry, LightId, MaterialId, ObjectId, Ray, ScenePatches, Surface, SurfacePoint,
+};
 use crate::lights::{LiSample, Light, Parallelogram};
 use crate::materials::{Bsdf, Material, Matte, TransportMode};
-use crate::math::{Aabb, DVec3};
+use crate::math::{Aabb, BoundingSphere, DVec3};
 use crate::textures::Texture;
 
 /// Everything that is rendered.
@@ -55,6 +57,15 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// What was decided on the way, for the user.
     pub notes: Vec<String>,
+    /// What is found out about the geometry when it is first asked for.
+    found: Found,
+}
+
+/// What is found out once, and only if something asks.
+#[derive(Default)]
+struct Found {
+    patches: OnceLock<ScenePatches>,
+    spheres: OnceLock<Vec<BoundingSphere>>,
 }
 
 impl Scene {
@@ -68,6 +79,31 @@ impl Scene {
     #[inline]
     pub fn light(&self, id: LightId) -> &dyn Light {
         &*self.lights[id.index()]
+    }
+
+    /// Which triangles of its meshes hold together; found when it is first asked for. (Not by the
+    /// cell's own closure: a thread that waits for its share of the work may be given another task
+    /// that asks as well.)
+    pub fn patches(&self) -> &ScenePatches {
+        match self.found.patches.get() {
+            Some(patches) => patches,
+            None => {
+                let patches = ScenePatches::new(&self.geometry);
+                self.found.patches.get_or_init(|| patches)
+            }
+        }
+    }
+
+    /// Sphere around an object, in world space; exact for a single sphere.
+    pub fn bounding_sphere(&self, id: ObjectId) -> BoundingSphere {
+        let spheres = match self.found.spheres.get() {
+            Some(spheres) => spheres,
+            None => {
+                let spheres = self.geometry.bounding_spheres();
+                self.found.spheres.get_or_init(|| spheres)
+            }
+        };
+        spheres[id.index()]
     }
 
     /// Makes the smaller sizes of all textures, on all threads.

@@ -2,6 +2,8 @@
 
 use std::sync::{LazyLock, OnceLock};
 
+use rayon::prelude::*;
+
 use super::pyramid::Pyramid;
 use crate::color::srgb_to_linear;
 
@@ -205,18 +207,46 @@ impl Image {
         sum.map(|s| s / n as f64)
     }
 
+    /// Smallest and largest number of each channel as they are kept, by all threads.
+    fn find_extremes(&self) -> [[f64; 4]; 2] {
+        /// Texels that one task looks at.
+        const CHUNK: usize = 1 << 16;
+        let none = [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
+        let texels = self.texels.len() / self.channels;
+        (0..texels.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|c| {
+                let mut range = none;
+                for i in c * CHUNK..((c + 1) * CHUNK).min(texels) {
+                    for (k, x) in self.at(i, Content::Data).into_iter().enumerate() {
+                        range[0][k] = range[0][k].min(x);
+                        range[1][k] = range[1][k].max(x);
+                    }
+                }
+                range
+            })
+            .reduce(
+                || none,
+                |a, b| {
+                    let pick = |end: usize, f: fn(f64, f64) -> f64| {
+                        std::array::from_fn(|k| f(a[end][k], b[end][k]))
+                    };
+                    [pick(0, f64::min), pick(1, f64::max)]
+                },
+            )
+    }
+
     /// Smallest and largest value of each channel, linear.
     pub fn range(&self, content: Content) -> [[f64; 4]; 2] {
-        let extremes = self.extremes.get_or_init(|| {
-            let mut range = [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
-            for i in 0..self.texels.len() / self.channels {
-                for (k, x) in self.at(i, Content::Data).into_iter().enumerate() {
-                    range[0][k] = range[0][k].min(x);
-                    range[1][k] = range[1][k].max(x);
-                }
+        // Not within the cell's closure: a thread that waits for its share may be given another task
+        // that asks for the same.
+        let extremes = match self.extremes.get() {
+            Some(extremes) => *extremes,
+            None => {
+                let found = self.find_extremes();
+                *self.extremes.get_or_init(|| found)
             }
-            range
-        });
+        };
         // The curve grows, so it maps extremes to extremes.
         let curved = content.is_srgb() && !matches!(self.texels, Texels::F32(_));
         extremes.map(|[r, g, b, a]| {

@@ -175,7 +175,7 @@ pub(crate) fn casters(scene: &Scene, specular_only: bool) -> Vec<Caster> {
                 }));
             }
             _ => {
-                let mut sphere = g.object_bounding_sphere(id);
+                let mut sphere = scene.bounding_sphere(id);
                 // Rounding must not push a corner out.
                 sphere.radius *= 1.0 + 1e-6;
                 out.push(caster(sphere, false));

@@ -20,7 +20,6 @@ use self::domain::{Tree, trees};
 use self::plan::{Leaf, Planner};
 use super::Targets;
 use super::emit::{EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
-use crate::geometry::ScenePatches;
 use crate::geometry::forecast::Order;
 use crate::sampling::{Sampler, hash2, stream};
 
@@ -126,15 +125,10 @@ pub(super) fn emission<'a>(cx: &EmissionContext<'a>, order: Order) -> Box<dyn Ph
     } else {
         0.0
     };
-    let patches = if nothing {
-        ScenePatches::default()
-    } else {
-        ScenePatches::new(&cx.scene.geometry)
-    };
     let planner = Planner {
         scene: cx.scene,
         accel: cx.accel,
-        patches: &patches,
+        patches: cx.scene.patches(),
         casters: &casters,
         purpose: cx.purpose,
         order,

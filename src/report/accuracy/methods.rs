@@ -1,7 +1,7 @@
 //! What is measured: methods, each a ladder of settings, and single changes to one setting. A
 //! method or a change is one line.
 
-use crate::integrators::IntegratorSettings;
+use crate::integrators::{IntegratorSettings, PhotonNeeds};
 use crate::photons::SAMPLES_PER_PASS;
 use crate::pipeline::RenderSettings;
 use crate::plugins::Registry;
@@ -42,7 +42,7 @@ impl Method {
     /// Whether it reads photon maps.
     pub(super) fn photons(&self, registry: &Registry) -> bool {
         let entry = registry.integrators.choose(Some(&self.integrator));
-        entry.is_ok_and(|e| e.photons)
+        entry.is_ok_and(|e| e.photons != PhotonNeeds::None)
     }
 }
 
@@ -66,6 +66,13 @@ type Line = (
 /// The methods; the first is what the others are compared with.
 const METHODS: &[Line] = &[
     ("path", "path tracing, unbiased", "path", None, path_ladder),
+    (
+        "hybrid",
+        "path tracing, caustics from photons",
+        "hybrid",
+        Some("uniform"),
+        hybrid_ladder,
+    ),
     (
         "photon",
         "photon mapping, photons spread evenly",
@@ -101,10 +108,10 @@ pub fn methods(registry: &Registry) -> Vec<Method> {
         .map(|e| Method {
             name: e.name.into(),
             doc: e.doc.into(),
-            apply: if e.photons {
-                photon_ladder
-            } else {
-                path_ladder
+            apply: match e.photons {
+                PhotonNeeds::All => photon_ladder,
+                PhotonNeeds::Caustic => hybrid_ladder,
+                PhotonNeeds::None => path_ladder,
             },
             integrator: e.name.into(),
             emission: None,
@@ -131,6 +138,12 @@ fn photon_ladder(s: &mut RenderSettings, rung: u32) {
     let samples = u64::from(s.width) * u64::from(s.height) * u64::from(of_pass);
     let photons = (samples / SAMPLES_PER_PHOTON).max(FEWEST_PHOTONS);
     set_photons(&mut s.integrator_settings, photons);
+}
+
+/// As many samples as path tracing, photons as photon mapping.
+fn hybrid_ladder(s: &mut RenderSettings, rung: u32) {
+    photon_ladder(s, rung);
+    path_ladder(s, rung);
 }
 
 fn set_photons(s: &mut IntegratorSettings, photons: u64) {

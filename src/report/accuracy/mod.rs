@@ -30,6 +30,7 @@ use std::path::PathBuf;
 
 use crate::control::Control;
 use crate::error::Result;
+use crate::integrators::PhotonNeeds;
 use crate::pipeline::{self, RenderSettings};
 use crate::plugins::Registry;
 use crate::scene::Scene;
@@ -182,7 +183,7 @@ pub fn study(
         exposure: options.exposure,
         clock: options.clock,
         photon_integrators: photon_integrators
-            .filter(|e| e.photons)
+            .filter(|e| e.photons != PhotonNeeds::None)
             .map(|e| e.name)
             .collect(),
     }))
