@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use dualight::control::Control;
+use dualight::effects::EffectSet;
 use dualight::film::Image;
 use dualight::import::{self, ImportOptions};
 use dualight::output;
@@ -147,8 +148,16 @@ fn the_counts_of_the_reproduction_are_still_true() {
                 count: contestant.photons[map],
             });
             let control = Control::default();
-            let counts =
-                follow_photons(&scene, &*accel, &*source, purpose, &settings, &control).counts;
+            let counts = follow_photons(
+                &scene,
+                &*accel,
+                &*source,
+                purpose,
+                EffectSet::all(),
+                &settings,
+                &control,
+            )
+            .counts;
             for (what, n) in [
                 ("emitted", counts.emitted),
                 ("check rays", counts.checked),

@@ -9,7 +9,7 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{add_quad, add_sphere, camera, glass, lambert};
+use common::{add_quad, add_room, add_sphere, camera, glass, lambert, light};
 use dualight::color::Rgb;
 use dualight::control::Control;
 use dualight::film::{Component, Image};
@@ -345,7 +345,7 @@ fn the_caustic_of_a_glass_sphere_carries_the_flux_of_snells_law() {
 }
 
 #[test]
-fn photon_mapping_and_path_tracing_agree_on_every_component() {
+fn integrators_agree_on_every_component() {
     let scene = common::box_scene();
     let runs = |integrator: &str, spp, photons| -> Vec<[f64; 4]> {
         (0..6)
@@ -357,7 +357,11 @@ fn photon_mapping_and_path_tracing_agree_on_every_component() {
             })
             .collect()
     };
-    let (path, photon) = (runs("path", 128, 0), runs("photon", 8, 200_000));
+    let path = runs("path", 128, 0);
+    let others = [
+        ("photon", runs("photon", 8, 200_000)),
+        ("hybrid", runs("hybrid", 32, 200_000)),
+    ];
     for (k, c) in Component::ALL.into_iter().enumerate() {
         let stats = |runs: &[[f64; 4]]| {
             let n = runs.len() as f64;
@@ -365,21 +369,64 @@ fn photon_mapping_and_path_tracing_agree_on_every_component() {
             let var = runs.iter().map(|r| (r[k] - m).powi(2)).sum::<f64>() / (n - 1.0);
             (m, (var / n).sqrt())
         };
-        let ((a, sa), (b, sb)) = (stats(&path), stats(&photon));
-        // 4σ of the difference, and 2 % for what kernels lose at the edges at this count.
-        let allowed = 4.0 * sa.hypot(sb) + 0.02 * a;
+        let (a, sa) = stats(&path);
+        for (name, other) in &others {
+            let (b, sb) = stats(other);
+            println!("{}: path {a} ± {sa}, {name} {b} ± {sb}", c.name());
+            // 4σ of the difference, and 2 % for what kernels lose at the edges at this count.
+            let allowed = 4.0 * sa.hypot(sb) + 0.02 * a;
+            assert!(
+                (a - b).abs() < allowed,
+                "{}: path {a} ± {sa}, {name} {b} ± {sb}",
+                c.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn without_caustics_the_hybrid_is_path_tracing_to_the_bit() {
+    let mut b = SceneBuilder::default();
+    let grey = b.add_material(&lambert("grey", Rgb::splat(0.5))).unwrap();
+    add_room(&mut b, grey, 2.0);
+    b.add_light(light("point", DVec3::new(0.3, 0.2, 0.1), DVec3::Y, 1.0));
+    b.add_camera(camera(DVec3::new(0.0, 0.0, 1.5), 60.0));
+    let scene = b.finish().unwrap();
+    let of = |integrator| image(&scene, &settings(integrator, 24, 8, 10_000));
+    assert!(of("path") == of("hybrid"));
+}
+
+/// A glass ball under a lamp without extent: no path from the camera finds its caustic.
+#[test]
+fn the_hybrid_finds_what_lamps_without_extent_make_of_glass() {
+    let mut b = SceneBuilder::default();
+    let grey = b.add_material(&lambert("grey", Rgb::splat(0.5))).unwrap();
+    let clear = b.add_material(&glass(1.5)).unwrap();
+    add_room(&mut b, grey, 2.0);
+    add_sphere(&mut b, "ball", clear, DVec3::new(0.0, -0.5, 0.0), 0.5);
+    b.add_light(light("point", DVec3::new(0.3, 1.6, 0.1), DVec3::Y, 1.0));
+    b.add_camera(camera(DVec3::new(0.0, 0.0, 1.9), 80.0));
+    let scene = b.finish().unwrap();
+    let of = |integrator, spp| image(&scene, &settings(integrator, 32, spp, 200_000));
+    let (path, photon, hybrid) = (of("path", 16), of("photon", 16), of("hybrid", 64));
+    let layers = ["caustics", "specular", "indirect"];
+    for layer in layers {
+        let [a, b, c] = [&path, &photon, &hybrid].map(|i| mean(i, layer));
+        println!("{layer}: path {a}, photon {b}, hybrid {c}");
+        // Noise of one picture each, and kernels of two sizes; path tracing lacks far more.
         assert!(
-            (a - b).abs() < allowed,
-            "{}: path {a} ± {sa}, photon {b} ± {sb}",
-            c.name()
+            (b / c - 1.0).abs() < 0.05,
+            "{layer}: photon {b}, hybrid {c}"
         );
     }
+    assert_eq!(mean(&path, "caustics"), 0.0);
+    assert!(mean(&hybrid, "caustics") > 0.0);
 }
 
 #[test]
 fn an_image_depends_on_the_seed_alone_not_on_threads() {
     let scene = common::box_scene();
-    for integrator in ["path", "photon"] {
+    for integrator in ["path", "photon", "hybrid"] {
         let with = |threads, seed| {
             let mut s = settings(integrator, 24, 5, 20_000);
             s.threads = Some(threads);

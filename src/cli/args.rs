@@ -192,7 +192,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Image")]
     pub seed: u64,
 
-    /// How light is computed [default: photon; see dualight plugins]
+    /// How light is computed: auto (photon where sharp mirrors or glass throw caustics, path
+    /// elsewhere), or a name [default: auto; see dualight plugins]
     #[arg(long, value_name = "NAME", help_heading = "Light transport")]
     pub integrator: Option<String>,
     /// What is simulated: auto (what the scene calls for), all, or changes to that such as

@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use super::args::{RenderArgs, SceneArgs, Solid, Units};
 use super::values::{Size, Sky};
+use crate::effects;
 use crate::error::{Error, Result};
 use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits, SolidGlass};
-use crate::integrators::IntegratorSettings;
+use crate::integrators::{IntegratorSettings, suited};
 use crate::output::{self, OutputSettings};
 use crate::pipeline::{PixelSampling, Progressive, RenderSettings};
 use crate::plugins::Registry;
@@ -70,7 +71,9 @@ impl Plan {
     /// another.
     pub fn new(args: &RenderArgs, registry: &Registry) -> Result<Self> {
         // The defaults get their names here, for the reports.
-        let integrator = registry.integrators.choose(args.integrator.as_deref())?;
+        if let Some(name) = named_integrator(args) {
+            registry.integrators.find(name)?;
+        }
         let accelerator = registry.accelerators.choose(args.accel.as_deref())?;
         let emission = registry.emissions.choose(args.emission.as_deref())?;
         let effects = args.effects.clone().unwrap_or_else(|| "auto".into());
@@ -102,7 +105,8 @@ impl Plan {
             quiet: args.quiet,
             size: args.size,
             settings: RenderSettings {
-                integrator: Some(integrator.name.into()),
+                // The scene has a say in it.
+                integrator: named_integrator(args).map(Into::into),
                 accelerator: Some(accelerator.name.into()),
                 emission: Some(emission.name.into()),
                 effects,
@@ -127,11 +131,35 @@ impl Plan {
         Ok(plan)
     }
 
+    /// The integrator and why it was chosen.
+    ///
+    /// # Errors
+    /// A wish for effects that names none.
+    pub fn integrator_for(
+        &self,
+        scene: &Scene,
+        registry: &Registry,
+    ) -> Result<(&'static str, String)> {
+        if let Some(name) = named_integrator(&self.args) {
+            let name = registry.integrators.find(name)?.name;
+            return Ok((name, "as was asked for".into()));
+        }
+        let effects = effects::survey(scene, &self.settings.effects, &registry.effects)?;
+        let a = &self.args;
+        let photons = a.photons.is_some()
+            || a.caustic_photons.is_some()
+            || a.nearest.is_some()
+            || a.gather.is_some()
+            || a.emission.is_some();
+        let (entry, why) = suited(&registry.integrators, scene, effects.set, photons)?;
+        Ok((entry.name, why))
+    }
+
     /// The settings for a scene, whose camera may settle the image's size.
     ///
     /// # Errors
     /// A crop outside the image.
-    pub fn settings_for(&self, scene: &Scene) -> Result<RenderSettings> {
+    pub fn settings_for(&self, scene: &Scene, integrator: &str) -> Result<RenderSettings> {
         let size = self.size.unwrap_or_else(|| {
             let camera = match &self.settings.camera {
                 None => scene.cameras.first(),
@@ -143,6 +171,7 @@ impl Plan {
         Ok(RenderSettings {
             width: size.width,
             height: size.height,
+            integrator: Some(integrator.into()),
             integrator_settings: integrator_settings(&self.args, size),
             ..self.settings.clone()
         })
@@ -159,6 +188,11 @@ impl Plan {
             _ => Ok(()),
         }
     }
+}
+
+/// The integrator that was named, if any was.
+fn named_integrator(args: &RenderArgs) -> Option<&str> {
+    args.integrator.as_deref().filter(|name| *name != "auto")
 }
 
 /// What was asked for, and for the rest what suits an image of that size.
@@ -273,7 +307,7 @@ mod tests {
         let expected = RenderSettings {
             width: 0,
             height: 0,
-            integrator: first(crate::integrators::INTEGRATORS[0].name),
+            integrator: None,
             accelerator: first(crate::accel::ACCELERATORS[0].name),
             emission: first(crate::photons::EMISSIONS[0].name),
             ..RenderSettings::default()

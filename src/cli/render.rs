@@ -16,6 +16,7 @@ use crate::import;
 use crate::output;
 use crate::pipeline::{self, RenderSettings, Rendering, Session};
 use crate::plugins::Registry;
+use crate::scene::Census;
 use crate::stats::StageTime;
 
 /// Renders a scene to image files.
@@ -43,7 +44,18 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
             console::say(format_args!("warning: {warning}"));
         }
     }
-    let settings = plan.settings_for(&scene)?;
+    let (integrator, reason) = plan.integrator_for(&scene, &registry)?;
+    let settings = plan.settings_for(&scene, integrator)?;
+    if !plan.quiet {
+        let census = Census::new(&scene);
+        if integrator == "path" && census.delta_lights > 0 && census.sharp_objects > 0 {
+            console::say(format_args!(
+                "warning: {} lights have no extent, and paths from the camera do not find what \
+                 mirrors and glass make of their light; render with --integrator photon or hybrid",
+                census.delta_lights
+            ));
+        }
+    }
     if let Some(why) = control.stopped() {
         return Ok(nothing(why));
     }
@@ -79,6 +91,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
     let summary = Summary {
         scene: &plan.scene,
         settings: &settings,
+        integrator_reason: &reason,
         outputs: &plan.outputs,
         metadata: &metadata,
         rendering: &rendering,

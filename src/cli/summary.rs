@@ -15,6 +15,7 @@ use crate::stats::PhotonCounts;
 pub(super) struct Summary<'a> {
     pub(super) scene: &'a Path,
     pub(super) settings: &'a RenderSettings,
+    pub(super) integrator_reason: &'a str,
     pub(super) outputs: &'a [PathBuf],
     pub(super) metadata: &'a Metadata,
     pub(super) rendering: &'a Rendering,
@@ -28,14 +29,15 @@ pub(super) fn table(s: &Summary) -> String {
     let mut rows: Vec<(&str, String)> = vec![(
         "rendered",
         format!(
-            "{}x{} pixels, {}, integrator {}",
+            "{}x{} pixels, {}, integrator {} ({})",
             r.width,
             r.height,
             match r.pixel_sampling {
                 PixelSampling::Uniform => format!("{} samples each", s.metadata.spp),
                 PixelSampling::Adaptive => format!("{} samples in the mean", r.spp),
             },
-            r.integrator.as_deref().unwrap_or_default()
+            r.integrator.as_deref().unwrap_or_default(),
+            s.integrator_reason
         ),
     )];
     rows.extend(
@@ -148,6 +150,7 @@ pub(super) fn json(s: &Summary) -> String {
         "outputs": s.outputs.iter().map(|p| p.to_string_lossy()).collect::<Vec<_>>(),
         "settings": {
             "integrator": r.integrator,
+            "integrator_reason": s.integrator_reason,
             "accelerator": r.accelerator,
             "emission": r.emission,
             "pixel_sampling": r.pixel_sampling.name(),

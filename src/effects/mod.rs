@@ -14,6 +14,8 @@ use bitflags::bitflags;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::geometry::SurfacePoint;
+use crate::materials::LobeClass;
 use crate::registry::Table;
 use crate::scene::{Census, Scene};
 
@@ -31,6 +33,31 @@ bitflags! {
         const CAUSTICS = 8;
         /// Light that comes by way of other diffuse surfaces.
         const INDIRECT = 16;
+    }
+}
+
+impl EffectSet {
+    /// Whether light is followed through a scattering at a point: bent transmission is
+    /// [`REFRACTION`](Self::REFRACTION), what is neither that nor diffuse
+    /// [`SPECULAR`](Self::SPECULAR).
+    #[inline]
+    pub fn follow(
+        self,
+        scene: &Scene,
+        sp: &SurfacePoint,
+        class: LobeClass,
+        transmitted: bool,
+    ) -> bool {
+        let both = Self::SPECULAR | Self::REFRACTION;
+        if class == LobeClass::Diffuse || self.contains(both) {
+            return true;
+        }
+        let bent = transmitted && scene.material(sp.material).traits().refracts;
+        self.contains(if bent {
+            Self::REFRACTION
+        } else {
+            Self::SPECULAR
+        })
     }
 }
 

@@ -217,6 +217,9 @@ impl PhotonMapping<'_> {
             let Some(s) = bsdf.sample(sampler.next_1d(), sampler.next_2d()) else {
                 return Rgb::ZERO;
             };
+            if !cx.effects.follow(cx.scene, &sp, s.class, s.transmitted) {
+                return Rgb::ZERO;
+            }
             beta *= s.weight;
             let survive = beta.max_channel().min(1.0);
             if depth >= ROULETTE_DEPTH {

@@ -3,7 +3,7 @@
 use super::RenderContext;
 use crate::color::Rgb;
 use crate::geometry::{LightId, Ray, SurfacePoint};
-use crate::materials::{BsdfValue, Scattering};
+use crate::materials::{BsdfValue, LobeClass, Scattering};
 use crate::math::DVec3;
 
 /// The power heuristic with exponent 2 (Veach 1997, 9.2.4) for `na` samples of density `a`
@@ -103,6 +103,15 @@ pub(super) struct DirectSample {
     pub(super) value: BsdfValue,
     /// The shadow ray.
     pub(super) ray: Ray,
+}
+
+impl DirectSample {
+    /// Whether what glossy lobes make of it is followed.
+    #[inline]
+    pub(super) fn follows_glossy(&self, cx: &RenderContext<'_>, sp: &SurfacePoint) -> bool {
+        let through = (self.ray.direction().dot(sp.ng) > 0.0) != sp.front;
+        cx.effects.follow(cx.scene, sp, LobeClass::Glossy, through)
+    }
 }
 
 /// Picks a light by flux and a point on it. `n_light` of these are taken against `n_bsdf`

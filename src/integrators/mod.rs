@@ -24,12 +24,14 @@ pub use visibility::Visibility;
 
 use crate::accel::Accelerator;
 use crate::effects::EffectSet;
+use crate::error::Result;
 use crate::film::PixelSample;
 use crate::geometry::{Differential, LightId, Ray, SurfacePoint};
 use crate::math::DVec3;
 use crate::photons::PhotonMaps;
+use crate::registry::Table;
 use crate::sampling::Sampler;
-use crate::scene::Scene;
+use crate::scene::{Census, Scene};
 use crate::stats::RayCounts;
 
 /// What integrators see.
@@ -130,11 +132,34 @@ pub struct IntegratorEntry {
     pub doc: &'static str,
     /// Which photon maps it reads.
     pub photons: PhotonNeeds,
+    /// Why a scene of which these effects are simulated should be rendered by it if nobody says
+    /// how; `None` if it should not.
+    pub suits: fn(&Census, EffectSet) -> Option<String>,
     /// Makes it.
     pub build: for<'a> fn(RenderContext<'a>) -> Box<dyn Integrator + 'a>,
 }
 
 crate::registry::impl_entry!(IntegratorEntry, "integrator");
 
-/// The integrators; the first is the default.
+/// The integrator that suits a scene, and why: the first of the table that says so. If
+/// photons are asked for, only those that read all photon maps.
+pub fn suited<'t>(
+    table: &'t Table<IntegratorEntry>,
+    scene: &Scene,
+    effects: EffectSet,
+    photons: bool,
+) -> Result<(&'t IntegratorEntry, String)> {
+    let census = Census::new(scene);
+    let mut entries = table.entries().iter();
+    if photons {
+        if let Some(e) = entries.find(|e| e.photons == PhotonNeeds::All) {
+            return Ok((e, "photons were asked for".into()));
+        }
+    } else if let Some(found) = entries.find_map(|e| Some((e, (e.suits)(&census, effects)?))) {
+        return Ok(found);
+    }
+    Ok((table.choose(None)?, "the first of the table".into()))
+}
+
+/// The integrators; the first is the default of the library, where nobody looks at the scene.
 pub static INTEGRATORS: &[IntegratorEntry] = &[photon::ENTRY, hybrid::ENTRY, path::ENTRY];

@@ -10,6 +10,7 @@ use super::light_sampling::{View, power_heuristic, sample_direct};
 use super::stored_light::{Stored, sites};
 use super::{BATCH, Integrator, IntegratorEntry, PhotonNeeds, RenderContext, Sample, Scratch};
 use crate::color::Rgb;
+use crate::effects::EffectSet;
 use crate::film::{Component, PixelSample};
 use crate::geometry::{Differential, Ray, SurfacePoint};
 use crate::materials::{Bsdf, BsdfValue, LobeClass, Scattering, TransportMode};
@@ -57,6 +58,18 @@ impl Walk {
             (Self::Diffuse | Self::DiffuseSpecular, true) => Self::Indirect,
             (Self::Diffuse | Self::DiffuseSpecular, false) => Self::DiffuseSpecular,
             (other, _) => other,
+        }
+    }
+
+    /// Whether what lies beyond this surface can be part of an effect that is simulated.
+    #[inline]
+    fn goes_on(self, effects: EffectSet) -> bool {
+        match self {
+            Self::Camera | Self::Specular => true,
+            Self::Diffuse | Self::DiffuseSpecular => {
+                effects.intersects(EffectSet::CAUSTICS | EffectSet::INDIRECT)
+            }
+            Self::Indirect => effects.contains(EffectSet::INDIRECT),
         }
     }
 
@@ -298,13 +311,14 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
         lights: &mut ArrayVec<Direct, BATCH>,
     ) -> bool {
         let cx = &self.cx;
-        if depth >= cx.settings.max_depth.unwrap_or(DEPTH_GUARD) {
+        if depth >= cx.settings.max_depth.unwrap_or(DEPTH_GUARD) || !w.walk.goes_on(cx.effects) {
             return false;
         }
         if bsdf.has_finite() {
             let u = w.sampler.next_2d();
             if let Some(mut direct) = sample_direct(cx, sp, bsdf, u, 1.0, 1.0) {
-                if PHOTONS && w.left_diffuse > 0 {
+                let dropped = PHOTONS && w.left_diffuse > 0;
+                if dropped || !direct.follows_glossy(cx, sp) {
                     direct.value.glossy = Rgb::ZERO;
                 }
                 lights.push(Direct {
@@ -319,6 +333,9 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
         let Some(s) = bsdf.sample(w.sampler.next_1d(), u) else {
             return false;
         };
+        if !cx.effects.follow(cx.scene, sp, s.class, s.transmitted) {
+            return false;
+        }
         w.beta *= s.weight;
         w.walk = w.walk.after(s.class);
         if PHOTONS {
@@ -353,5 +370,11 @@ pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "path",
     doc: "unbiased path tracing with next-event estimation and MIS: the reference",
     photons: PhotonNeeds::None,
+    suits: |census, _| {
+        Some(match census.sharp_objects {
+            0 => "no mirror or glass is sharp enough for photons to help".into(),
+            n => format!("{n} sharp mirrors or glasses throw no caustics that are simulated"),
+        })
+    },
     build: |cx| Box::new(Path::<false> { cx }),
 };

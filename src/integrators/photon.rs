@@ -170,8 +170,7 @@ impl PhotonMapping<'_> {
                     out.add(to, beta * radiance);
                 }
             }
-            let chains = EffectSet::SPECULAR | EffectSet::REFRACTION;
-            if !bsdf.has_specular() || !cx.effects.intersects(chains) {
+            if !bsdf.has_specular() {
                 return;
             }
             bsdf.keep_specular();
@@ -179,6 +178,11 @@ impl PhotonMapping<'_> {
                 // Reflection and refraction are both followed: their shares are known exactly,
                 // and a rare bright reflection is the worst noise that glass has.
                 if let Some(mut branches) = bsdf.branches() {
+                    branches.retain(|b| {
+                        // A path of one colour has no use for the other branches of a prism.
+                        !(beta * b.weight).is_black()
+                            && cx.effects.follow(cx.scene, &sp, b.class, b.transmitted)
+                    });
                     let Some(main) = branches.pop() else { return };
                     for b in branches {
                         let side = Chain {
@@ -205,7 +209,8 @@ impl PhotonMapping<'_> {
             }
             if bsdf.has_finite() {
                 let u = sampler.next_2d();
-                if let Some(direct) = sample_direct(cx, &sp, &bsdf, u, 1.0, 1.0) {
+                let direct = sample_direct(cx, &sp, &bsdf, u, 1.0, 1.0);
+                if let Some(direct) = direct.filter(|d| d.follows_glossy(cx, &sp)) {
                     scratch.rays.shadow += 1;
                     if !cx.accel.occluded(&direct.ray) {
                         out.add(Component::Specular, beta * direct.value.glossy);
@@ -216,6 +221,9 @@ impl PhotonMapping<'_> {
             let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
                 return;
             };
+            if !cx.effects.follow(cx.scene, &sp, s.class, s.transmitted) {
+                return;
+            }
             beta *= s.weight;
             last = (s.class != LobeClass::Delta).then_some((s.pdf, sp.p));
             if cx.settings.roulette && depth + 1 >= ROULETTE_DEPTH {
@@ -241,5 +249,13 @@ pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "photon",
     doc: "photon mapping: direct light by shadow rays, caustics and indirect light from photons",
     photons: PhotonNeeds::All,
+    suits: |census, effects| {
+        (effects.contains(EffectSet::CAUSTICS) && census.sharp_objects > 0).then(|| {
+            format!(
+                "{} sharp mirrors or glasses throw caustics",
+                census.sharp_objects
+            )
+        })
+    },
     build: |cx| Box::new(PhotonMapping { cx }),
 };

@@ -49,7 +49,11 @@ impl Light for DirectionalLight {
             None => self.irradiance,
             Some(disc) => disc.radiance / warp::cone_pdf(disc.complement),
         };
-        fluence * (PI * self.scene.radius * self.scene.radius)
+        fluence * self.scene.beam_area()
+    }
+
+    fn is_delta(&self) -> bool {
+        self.disc.is_none()
     }
 
     fn importance(&self, _p: DVec3) -> f64 {

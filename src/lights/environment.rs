@@ -43,7 +43,7 @@ impl Environment {
 
 impl Light for Environment {
     fn power(&self) -> Rgb {
-        self.fluence() * (PI * self.scene.radius * self.scene.radius)
+        self.fluence() * self.scene.beam_area()
     }
 
     fn importance(&self, _p: DVec3) -> f64 {

@@ -125,6 +125,11 @@ pub trait Light: Send + Sync {
         None
     }
 
+    /// Whether it has no extent, so that no ray ever meets it by chance.
+    fn is_delta(&self) -> bool {
+        false
+    }
+
     /// Whether it is seen by rays that leave the scene.
     fn is_infinite(&self) -> bool {
         false

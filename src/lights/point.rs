@@ -53,6 +53,10 @@ impl Light for PointLight {
         self.intensity * (4.0 * PI)
     }
 
+    fn is_delta(&self) -> bool {
+        true
+    }
+
     fn importance(&self, p: DVec3) -> f64 {
         self.intensity.luminance() / (p - self.position).length_squared()
     }

@@ -155,6 +155,10 @@ impl Light for SpotLight {
         self.intensity * self.cone.integral()
     }
 
+    fn is_delta(&self) -> bool {
+        true
+    }
+
     fn importance(&self, p: DVec3) -> f64 {
         let to = p - self.position;
         let dir = to.normalize_or_zero();

@@ -7,6 +7,7 @@ use crate::geometry::Surface;
 
 struct Conductor {
     lobe: GgxReflection,
+    roughness: f64,
 }
 
 impl Material for Conductor {
@@ -18,6 +19,7 @@ impl Material for Conductor {
     fn traits(&self) -> MaterialTraits {
         MaterialTraits {
             reflects: true,
+            roughness: self.roughness,
             ..Default::default()
         }
     }
@@ -31,6 +33,7 @@ fn build(d: &MaterialDesc) -> Result<Box<dyn Material>, String> {
     let alpha = d.roughness.max(MaterialDesc::SMOOTH).powi(2);
     Ok(Box::new(Conductor {
         lobe: GgxReflection::new(alpha, fresnel),
+        roughness: d.roughness,
     }))
 }
 

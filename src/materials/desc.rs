@@ -238,4 +238,17 @@ pub struct MaterialTraits {
     pub transmits: bool,
     /// Whether passing light is bent.
     pub refracts: bool,
+    /// Least roughness of what reflects or transmits.
+    pub roughness: f64,
+}
+
+impl MaterialTraits {
+    /// Roughness (glTF's) below which reflections and refractions are sharp: wider ones are found by
+    /// shadow rays and by chance, and throw nothing that one would call a caustic.
+    const SHARP: f64 = 0.3;
+
+    /// Whether it reflects or transmits sharply.
+    pub fn is_sharp(&self) -> bool {
+        (self.reflects || self.transmits) && self.roughness < Self::SHARP
+    }
 }

@@ -120,6 +120,7 @@ impl Material for DielectricMaterial {
             reflects: self.interface.ior != 1.0,
             transmits: true,
             refracts: self.interface.refracts(),
+            roughness: self.interface.ggx.y.sqrt(),
         }
     }
 

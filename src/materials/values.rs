@@ -209,6 +209,10 @@ impl Values {
         let layer = high.dielectric_layer();
         let dielectric = 1.0 - low.metallic;
         let transmits = high.transmission > 0.0 && dielectric > 0.0;
+        let coat = match high.clearcoat > 0.0 {
+            true => low.clearcoat_roughness,
+            false => f64::INFINITY,
+        };
         MaterialTraits {
             diffuse: high.base_color.max_channel() * dielectric * (1.0 - low.transmission)
                 + high.sheen_color.max_channel(),
@@ -220,6 +224,7 @@ impl Values {
                 || transmits,
             transmits,
             refracts: transmits && high.volume && (high.ior != 1.0 || high.dispersion > 0.0),
+            roughness: low.roughness.min(coat),
         }
     }
 }

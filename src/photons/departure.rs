@@ -1,7 +1,5 @@
 //! How a photon leaves a light, from two points of the unit square: the same for all emissions.
 
-use std::f64::consts::PI;
-
 use super::{EmittedPhoton, Targets};
 use crate::geometry::Ray;
 use crate::lights::Light;
@@ -25,11 +23,11 @@ pub(super) fn leave(
         let (p, area) = match targets {
             // Beside the scene, on the disc that its shadow fills.
             None => {
-                let radius = around.radius * (1.0 + 1e-6);
+                let radius = around.beam_radius();
                 let frame = Frame::from_normal(distant.direction);
                 let [x, y] = warp::disc(second);
                 let p = around.center + (frame.x * x + frame.y * y - frame.z) * radius;
-                (p, PI * radius * radius)
+                (p, around.beam_area())
             }
             // From beside the target back out of the scene.
             Some(targets) => {

@@ -124,7 +124,7 @@ pub fn trace_photons(
                 Purpose::Caustic => settings.caustic,
             },
         });
-        let pass = follow_photons(scene, accel, &*source, purpose, settings, control);
+        let pass = follow_photons(scene, accel, &*source, purpose, effects, settings, control);
         maps.rays.add(&pass.rays);
         maps.tracing += start.elapsed().as_secs_f64();
         pass

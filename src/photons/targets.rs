@@ -1,8 +1,14 @@
 //! Where specular objects are, seen from a light: the directions that caustic photons take.
 //!
 //! Each specular object (or cluster, if there are many) is held by a bounding sphere. Photons
-//! are sent uniformly over the union of the cones under which a light's point sees these
-//! spheres; overlaps are counted, so the density of every direction is known exactly.
+//! are sent uniformly within the cones under which a light's point sees these spheres: most of them
+//! to each cone by its size, so that what is large is not thin, and some to each alike, so that what
+//! is small beside something large is not left with nothing. Where cones overlap their densities
+//! add, so that of every direction is known exactly.
+
+use std::f64::consts::PI;
+
+use arrayvec::ArrayVec;
 
 use crate::math::{BoundingSphere, DVec3, Frame};
 use crate::sampling::warp;
@@ -74,66 +80,82 @@ impl Targets {
 
     /// A direction from `from` toward some sphere, and its density in solid angle.
     pub fn sample_direction(&self, from: DVec3, u: [f64; 2]) -> Option<(DVec3, f64)> {
-        let cones = |s| Cone::new(s, from);
-        let total: f64 = self.spheres.iter().map(|s| cones(s).complement).sum();
-        let mut rest = u[0] * total;
-        let mut chosen = None;
-        for s in &self.spheres {
-            let cone = cones(s);
-            chosen = Some((
-                cone,
-                (rest / cone.complement).clamp(0.0, 1.0 - f64::EPSILON),
-            ));
-            if rest < cone.complement {
-                break;
-            }
-            rest -= cone.complement;
-        }
-        let (cone, v) = chosen?;
-        let local = warp::cone_from_complement([v, u[1]], cone.complement);
-        let dir = Frame::from_normal(cone.axis).to_world(local);
+        let cones: ArrayVec<Cone, MAX_SPHERES> =
+            self.spheres.iter().map(|s| Cone::new(s, from)).collect();
+        let shares = Shares::new(cones.iter().map(|c| c.complement));
+        let (i, v) = shares.choose(u[0])?;
+        let local = warp::cone_from_complement([v, u[1]], cones[i].complement);
+        let dir = Frame::from_normal(cones[i].axis).to_world(local);
         // The chosen cone holds it by construction; the others by test.
-        let overlap = self
-            .spheres
-            .iter()
-            .filter(|s| cones(s).holds(dir))
-            .count()
-            .max(1);
-        let pdf = overlap as f64 / (2.0 * std::f64::consts::PI * total);
-        Some((dir, pdf))
+        let holds = |(k, cone): (usize, &Cone)| k == i || cone.holds(dir);
+        let pdf = shares.density(cones.iter().enumerate().map(holds));
+        Some((dir, pdf / (2.0 * PI)))
     }
 
     /// A point of the union of the spheres' shadows on a plane normal to `direction`, and its
     /// density in area. The point lies beside some sphere's centre.
     pub fn sample_disc(&self, direction: DVec3, u: [f64; 2]) -> Option<(DVec3, f64)> {
         let area = |s: &BoundingSphere| s.radius * s.radius;
-        let total: f64 = self.spheres.iter().map(area).sum();
-        if !(total > 0.0) {
-            return None;
-        }
-        let mut rest = u[0] * total;
-        let mut chosen = None;
-        for s in &self.spheres {
-            chosen = Some((s, (rest / area(s)).clamp(0.0, 1.0 - f64::EPSILON)));
-            if rest < area(s) {
-                break;
-            }
-            rest -= area(s);
-        }
-        let (s, v) = chosen?;
+        let shares = Shares::new(self.spheres.iter().map(area));
+        let (i, v) = shares.choose(u[0])?;
+        let s = &self.spheres[i];
         let frame = Frame::from_normal(direction);
         let [x, y] = warp::disc([v, u[1]]);
         let p = s.center + (frame.x * x + frame.y * y) * s.radius;
-        let overlap = self
-            .spheres
-            .iter()
-            .filter(|t| {
-                let d = p - t.center;
-                (d - direction * d.dot(direction)).length_squared() <= area(t) * (1.0 + 1e-12)
-            })
-            .count()
-            .max(1);
-        Some((p, overlap as f64 / (std::f64::consts::PI * total)))
+        let holds = |(k, t): (usize, &BoundingSphere)| {
+            let d = p - t.center;
+            k == i || (d - direction * d.dot(direction)).length_squared() <= area(t)
+        };
+        let pdf = shares.density(self.spheres.iter().enumerate().map(holds));
+        Some((p, pdf / PI))
+    }
+}
+
+/// Share of the photons that goes to all targets alike, whatever their size.
+const ALIKE: f64 = 0.25;
+
+/// How photons are shared among targets.
+struct Shares {
+    /// Size of each, and the probability to choose it.
+    parts: ArrayVec<(f64, f64), MAX_SPHERES>,
+}
+
+impl Shares {
+    fn new(sizes: impl Iterator<Item = f64> + Clone) -> Self {
+        let total: f64 = sizes.clone().sum();
+        let n = sizes.clone().filter(|s| *s > 0.0).count() as f64;
+        let share = |size: f64| match size > 0.0 {
+            true => (1.0 - ALIKE) * size / total + ALIKE / n,
+            false => 0.0,
+        };
+        Self {
+            parts: sizes.map(|s| (s, share(s))).collect(),
+        }
+    }
+
+    /// Chooses one by `u`, and makes of the rest of `u` a number of its own.
+    fn choose(&self, u: f64) -> Option<(usize, f64)> {
+        let mut rest = u;
+        let mut chosen = None;
+        for (i, &(_, p)) in self.parts.iter().enumerate() {
+            if p > 0.0 {
+                chosen = Some((i, (rest / p).clamp(0.0, 1.0 - f64::EPSILON)));
+                if rest < p {
+                    break;
+                }
+                rest -= p;
+            }
+        }
+        chosen
+    }
+
+    /// Density, in units of size, of what lies within some of them.
+    fn density(&self, within: impl Iterator<Item = bool>) -> f64 {
+        let parts = self.parts.iter().zip(within);
+        parts
+            .filter(|(part, within)| *within && part.1 > 0.0)
+            .map(|((size, p), _)| p / size)
+            .sum()
     }
 }
 

@@ -8,6 +8,7 @@ use super::photon::{Photon, PhotonClass};
 use super::{EmittedPhoton, PhotonSettings};
 use crate::accel::Accelerator;
 use crate::control::Control;
+use crate::effects::EffectSet;
 use crate::lights::range_window;
 use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::sampling::{Rng, hash2, stream};
@@ -48,6 +49,7 @@ pub fn follow_photons(
     accel: &dyn Accelerator,
     source: &dyn PhotonSource,
     purpose: Purpose,
+    effects: EffectSet,
     settings: &PhotonSettings,
     control: &Control,
 ) -> StoredPhotons {
@@ -61,6 +63,7 @@ pub fn follow_photons(
         scene,
         accel,
         purpose,
+        effects,
         settings,
     };
     let batches: Vec<Batch> = (0..n.div_ceil(BATCH))
@@ -108,6 +111,7 @@ struct Tracer<'a> {
     scene: &'a Scene,
     accel: &'a dyn Accelerator,
     purpose: Purpose,
+    effects: EffectSet,
     settings: &'a PhotonSettings,
 }
 
@@ -175,6 +179,10 @@ impl Tracer<'_> {
                 out.ledger.absorbed += power;
                 return;
             };
+            if !self.effects.follow(self.scene, &sp, s.class, s.transmitted) {
+                out.ledger.absorbed += power;
+                return;
+            }
             let mut weight = s.weight;
             if self.settings.roulette {
                 let survive = weight.max_channel().min(1.0);

@@ -3,6 +3,7 @@
 use crate::accel::Accelerator;
 use crate::cameras::Camera;
 use crate::control::Control;
+use crate::effects::EffectSet;
 use crate::film::{Channel, Image, Layer};
 use crate::geometry::Ray;
 use crate::math::DVec3;
@@ -78,8 +79,15 @@ impl View<'_> {
                 purpose,
                 count: [settings.global, settings.caustic][map],
             });
-            let stored =
-                follow_photons(self.scene, self.accel, &*source, purpose, settings, control);
+            let stored = follow_photons(
+                self.scene,
+                self.accel,
+                &*source,
+                purpose,
+                EffectSet::all(),
+                settings,
+                control,
+            );
             out.counts[map] = stored.counts;
             let all = stored.photons.iter();
             for p in all.filter(|p| !first || p.class != PhotonClass::Indirect) {

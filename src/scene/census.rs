@@ -27,6 +27,10 @@ pub struct Census {
     pub traits: MaterialTraits,
     /// Objects whose material reflects like a mirror or transmits.
     pub specular_objects: usize,
+    /// Those of them that do so [sharply](MaterialTraits::is_sharp).
+    pub sharp_objects: usize,
+    /// Lights without extent.
+    pub delta_lights: usize,
     /// Whether some body absorbs light on its way.
     pub absorbs: bool,
 }
@@ -38,8 +42,10 @@ impl Census {
         let mut c = Self {
             shapes: g.shapes.len(),
             objects: g.objects.len(),
+            delta_lights: scene.lights.iter().filter(|l| l.is_delta()).count(),
             ..Self::default()
         };
+        c.traits.roughness = f64::INFINITY;
         for shape in &g.shapes {
             if let Shape::Mesh(m) = shape {
                 c.triangles += m.indices.len() as u64;
@@ -56,12 +62,17 @@ impl Census {
             let material = scene.material(o.material);
             let t = material.traits();
             c.specular_objects += usize::from(t.reflects || t.transmits);
+            c.sharp_objects += usize::from(t.is_sharp());
             c.absorbs |= material.interior().is_some();
             c.traits = MaterialTraits {
                 diffuse: c.traits.diffuse.max(t.diffuse),
                 reflects: c.traits.reflects || t.reflects,
                 transmits: c.traits.transmits || t.transmits,
                 refracts: c.traits.refracts || t.refracts,
+                roughness: match t.reflects || t.transmits {
+                    true => c.traits.roughness.min(t.roughness),
+                    false => c.traits.roughness,
+                },
             };
         }
         c.materials = used.iter().filter(|u| **u).count();

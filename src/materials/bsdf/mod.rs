@@ -390,9 +390,15 @@ impl Bsdf {
                 }
                 let factor = self.transport_factor(view.wo, wi, s.wi, e.lobe.eta())
                     * self.uncovered(e.under, wi);
+                let weight = s.weight * factor;
+                // Lobes of glass that disperses, one for each channel, reflect alike.
+                if let Some(same) = out.iter_mut().find(|b: &&mut BsdfSample| b.wi == wi) {
+                    same.weight += weight;
+                    continue;
+                }
                 out.try_push(BsdfSample {
                     wi,
-                    weight: s.weight * factor,
+                    weight,
                     pdf: 0.0,
                     class: LobeClass::Delta,
                     transmitted: s.wi.z < 0.0,

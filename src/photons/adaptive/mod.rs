@@ -198,18 +198,37 @@ impl Adaptive<'_> {
                 Purpose::Caustic => f * leaf.weight,
             });
         }
-        let sum: f64 = weights.iter().sum();
-        let (mut acc, mut given, mut until) = (0.0, 0, 0);
+        let scale = scale(&weights, count as f64);
+        let mut acc = 0.0;
         for w in weights {
-            acc += w;
-            // Rounding the running sum keeps the total; one photon at least keeps the mean.
-            let to = (acc / sum * count as f64).round() as u64;
-            let n = to.saturating_sub(until).max(1);
-            until = to.max(until);
-            given += n;
-            self.first.push(given);
+            // One photon at least keeps the mean, and rounding the running sum the total.
+            acc += (w * scale).max(1.0);
+            self.first.push(acc.round() as u64);
         }
     }
+}
+
+/// What to multiply weights by so that they sum to `count`, each counted as one at least. Zero if
+/// there are more of them.
+fn scale(weights: &[f64], count: f64) -> f64 {
+    let mut sorted = weights.to_vec();
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    let mut sum: f64 = sorted.iter().sum();
+    let mut ones = 0.0;
+    // The smallest are counted as one each, until what is left is worth more.
+    while let Some(&least) = sorted.last() {
+        let scale = (count - ones) / sum;
+        if !(sum > 0.0) || scale <= 0.0 {
+            return 0.0;
+        }
+        if least * scale >= 1.0 {
+            return scale;
+        }
+        sum -= least;
+        ones += 1.0;
+        sorted.pop();
+    }
+    0.0
 }
 
 fn build<'a>(cx: &EmissionContext<'a>) -> Box<dyn PhotonSource + 'a> {
@@ -222,3 +241,24 @@ pub(super) const ENTRY: EmissionEntry = EmissionEntry {
     doc: "more photons where what they meet changes, as derivatives of their hits forecast it",
     build,
 };
+
+#[cfg(test)]
+mod tests {
+    use super::scale;
+
+    #[test]
+    fn a_budget_is_kept_and_every_cell_has_one_photon() {
+        let total = |w: &[f64], count: f64| -> f64 {
+            let s = scale(w, count);
+            w.iter().map(|w| (w * s).max(1.0)).sum()
+        };
+        for count in [5.0, 10.0, 1000.0] {
+            for weights in [vec![1.0; 5], vec![1e-9, 1.0, 0.0, 3.0, 1e-3]] {
+                assert!((total(&weights, count) - count).abs() < 1e-6 * count);
+            }
+        }
+        // More cells than photons: one each.
+        assert_eq!(total(&[0.5; 20], 10.0), 20.0);
+        assert_eq!(total(&[0.0; 3], 10.0), 3.0);
+    }
+}

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::output;
 use crate::pipeline::RenderSettings;
 use crate::sampling::hash2;
+use crate::scene::Census;
 
 /// Pictures that a computed reference is the mean of, at least: their spread is its error.
 const LEAST: u32 = 8;
@@ -53,7 +54,22 @@ pub(super) fn read(path: &Path, width: u32, height: u32) -> Result<Reference> {
     })
 }
 
-/// Computes a reference by `path` until its own error is at most `goal` or `seconds` are over;
+/// How a reference is computed: by `path`, but for what no path from the camera finds.
+fn integrator(census: &Census) -> (&'static str, String) {
+    if census.delta_lights == 0 || census.sharp_objects == 0 {
+        return ("path", "path".into());
+    }
+    let why = format!(
+        "hybrid (paths do not find what mirrors and glass make of {} lights without extent)",
+        census.delta_lights
+    );
+    ("hybrid", why)
+}
+
+/// Caustic photons of each picture of a reference, if it has any.
+const PHOTONS: u64 = 1_000_000;
+
+/// Computes a reference, by `path` where that finds all light, until its own error is at most `goal` or `seconds` are over;
 /// `None` if stopped.
 ///
 /// `goal` is asked with the mean so far, once there is one: what it is a fraction of depends on
@@ -68,11 +84,13 @@ pub(super) fn compute(
     let stage = renderer
         .control
         .stage("reference", "ms", (seconds * 1e3) as u64);
+    let (name, origin) = integrator(&Census::new(renderer.scene));
     let mut settings = RenderSettings {
-        integrator: Some("path".into()),
+        integrator: Some(name.into()),
         spp: SAMPLES,
         ..base.clone()
     };
+    settings.integrator_settings.caustic_photons = PHOTONS;
     let (width, height) = (base.width, base.height);
     let mut moments = Moments::new(width as usize * height as usize);
     let (mut told, mut next) = (0, LEAST);
@@ -106,7 +124,7 @@ pub(super) fn compute(
             return Ok(Some(Reference {
                 layers,
                 origin: format!(
-                    "path, {spp} samples per pixel; its own relMSE is {:.1e}",
+                    "{origin}, {spp} samples per pixel; its own relMSE is {:.1e}",
                     error[0]
                 ),
                 error,
