@@ -128,13 +128,15 @@ pub fn reset_peak_memory() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Processor time of this process so far, all threads together, in seconds (Linux).
+/// Processor time of this process so far, all threads together, in seconds, to the nanosecond.
+#[cfg(unix)]
 pub fn cpu_seconds() -> Option<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The name, in parentheses, may hold anything; the times are fields 14 and 15 of the whole.
-    let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
-    let user: f64 = fields.next()?.parse().ok()?;
-    let system: f64 = fields.next()?.parse().ok()?;
-    // What `sysconf(_SC_CLK_TCK)` returns on every Linux there is.
-    Some((user + system) / 100.0)
+    let t = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Some(t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9)
+}
+
+/// Processor time of this process, where it is known: not here.
+#[cfg(not(unix))]
+pub fn cpu_seconds() -> Option<f64> {
+    None
 }

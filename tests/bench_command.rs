@@ -110,6 +110,17 @@ fn a_baseline_that_was_better_is_told_and_ends_with_status_1() {
         text(&worse.stderr)
     );
 
+    // A baseline that says nothing is no baseline that was met.
+    for options in [
+        "--synthetic spheres:400 --accel bvh --threads 1 --quiet",
+        "--synthetic spheres:500 --accel bvh --threads 2 --quiet",
+    ] {
+        let none = bench(d, &format!("{options} --baseline same.txt"));
+        let said = text(&none.stderr);
+        assert_eq!(none.status.code(), Some(2), "{said}");
+        assert!(said.contains("nothing to compare"), "{said}");
+    }
+
     fs::write(d.join("other.txt"), "{}").unwrap();
     for (options, status, part) in [
         ("--synthetic soup", 2, "KIND:N"),

@@ -7,6 +7,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
 use dualight::control::Control;
 use dualight::film::Film;
 use dualight::import::{self, ImportOptions};
@@ -212,6 +214,34 @@ fn a_film_is_kept_gone_on_with_and_guarded() {
     fs::write(d.join("e.film"), &image).unwrap();
     ended(&dualight(d, "-o d.exr --resume e.film"), 1, "damaged");
     assert!(!d.join("d.exr").exists());
+}
+
+/// A scene of several files is another one if any of them changes.
+#[test]
+fn a_film_is_not_gone_on_with_if_a_buffer_changed() {
+    let directory = tempfile::tempdir().unwrap();
+    let d = directory.path();
+    let text = fs::read_to_string("scenes/box.gltf").unwrap();
+    let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let uri = json["buffers"][0]["uri"].as_str().unwrap().to_owned();
+    let (_, data) = uri.split_once(',').unwrap();
+    let mut bytes = BASE64.decode(data).unwrap();
+    json["buffers"][0]["uri"] = "the%20buffer.bin".into();
+    fs::write(d.join("s.gltf"), json.to_string()).unwrap();
+    fs::write(d.join("the buffer.bin"), &bytes).unwrap();
+    let render = || {
+        Command::new(env!("CARGO_BIN_EXE_dualight"))
+            .args("render s.gltf -o a.exr --size 8x8 --spp 4 --resume a.film".split_whitespace())
+            .current_dir(d)
+            .output()
+            .unwrap()
+    };
+    ended(&render(), 0, "begins");
+    ended(&render(), 0, "goes on");
+    // The lowest bits of one coordinate.
+    bytes[0] ^= 1;
+    fs::write(d.join("the buffer.bin"), &bytes).unwrap();
+    ended(&render(), 1, "other settings");
 }
 
 #[test]

@@ -35,6 +35,30 @@ fn names(directory: &Path) -> Vec<String> {
 }
 
 #[test]
+fn the_integrator_is_told_with_its_reason_and_idle_options_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let d = directory.path();
+    let said = |options: &str| {
+        let out = render(d, &format!("-o a.exr --size 8x8 --spp 1 {options}"));
+        let said = String::from_utf8(out.stderr).unwrap();
+        assert!(out.status.success(), "{said}");
+        said
+    };
+    let auto = said("");
+    assert!(auto.contains("integrator photon (2 sharp"), "{auto}");
+    let none = said("--effects -caustics");
+    assert!(none.contains("integrator path ("), "{none}");
+    // Whoever speaks of photons wants them.
+    let asked = said("--effects -caustics --photons 1k");
+    assert!(asked.contains("integrator photon ("), "{asked}");
+    let idle = said("--integrator path --photons 1k --emission adaptive");
+    for option in ["--photons", "--emission"] {
+        let line = format!("warning: {option} has no meaning for the integrator path");
+        assert!(idle.contains(&line), "{idle}");
+    }
+}
+
+#[test]
 fn images_and_statistics_are_written() {
     let directory = tempfile::tempdir().unwrap();
     let d = directory.path();

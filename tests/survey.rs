@@ -8,14 +8,15 @@ use std::sync::Arc;
 
 use common::render::{GATHER, PATH, Size, mean, rendering, settings};
 use common::{add_room, camera, lambert, lamp, light};
+use dualight::cameras::{CameraDesc, Lens};
 use dualight::color::Rgb;
-use dualight::effects::{EFFECTS, survey};
+use dualight::effects::{Acts, EFFECTS, omissions, survey};
 use dualight::geometry::{MaterialId, Ray, TriangleMesh};
-use dualight::materials::{MaterialDesc, TextureSlots, TransportMode};
+use dualight::materials::{AlphaMode, MaterialDesc, TextureSlots, TransportMode};
 use dualight::math::{DAffine3, DVec3};
 use dualight::plugins::Registry;
 use dualight::sampling::Rng;
-use dualight::scene::{MeshPlacement, Scene, SceneBuilder};
+use dualight::scene::{MeshPlacement, Omit, Scene, SceneBuilder};
 use dualight::textures::{Content, Image, Texels, Texture};
 
 /// An image of 4 × 4 texels, each channel all 0, all 255 or of both.
@@ -199,8 +200,116 @@ fn what_is_switched_off_is_not_followed() {
     }
     let ([_, less], _) = layers(GATHER, "-refraction");
     let ([_, all], _) = layers(GATHER, "auto");
-    assert!(less < 0.7 * all, "the caustic of glass is there: {less} of {all}");
+    assert!(
+        less < 0.7 * all,
+        "the caustic of glass is there: {less} of {all}"
+    );
     // Paths end where nothing is left for them to find.
     let ((_, few), (_, many)) = (layers(PATH, "-indirect,-caustics"), layers(PATH, "auto"));
     assert!(2 * few.bounce < many.bounce, "{few:?} {many:?}");
+}
+
+/// A scene that has something of everything.
+fn everything(omit: Omit) -> Scene {
+    let mut b = SceneBuilder::default();
+    b.leave_out(omit);
+    let white = || {
+        let image = Image::from_texels(1, 1, 4, Texels::U8(vec![255; 4])).unwrap();
+        Some(Texture::new(Arc::new(image), Content::Data))
+    };
+    let textures = TextureSlots {
+        base_color: white(),
+        normal: white(),
+        ..Default::default()
+    };
+    let all = MaterialDesc {
+        metallic: 0.0,
+        alpha_mode: AlphaMode::Blend,
+        base_alpha: 0.5,
+        roughness: 0.2,
+        transmission: 0.5,
+        volume: true,
+        attenuation_distance: 1.0,
+        dispersion: 1.0,
+        clearcoat: 1.0,
+        sheen_color: Rgb::ONE,
+        iridescence: 1.0,
+        anisotropy: 0.5,
+        diffuse_transmission: 0.5,
+        textures: Some(Arc::new(textures)),
+        ..Default::default()
+    };
+    let id = b.add_material(&all).unwrap();
+    add_square(&mut b, id, DVec3::ZERO);
+    let shape = b.add_mesh(
+        TriangleMesh {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            indices: vec![[0, 1, 2]],
+            uv_sets: vec![vec![[0.0; 2]; 3]],
+            ..Default::default()
+        },
+        "twice",
+    );
+    for z in [-2.0, -3.0] {
+        b.place(MeshPlacement {
+            shape,
+            material: id,
+            world_from_object: DAffine3::from_translation(DVec3::Z * z),
+            name: "twice".into(),
+        });
+    }
+    b.add_light(light("environment", DVec3::ZERO, DVec3::Y, 1.0));
+    b.add_camera(CameraDesc {
+        lens: Some(Lens {
+            radius: 0.1,
+            focus: 2.0,
+            blades: 0,
+            rotation: 0.0,
+            ratio: 1.0,
+        }),
+        ..camera(DVec3::new(0.0, 0.0, 2.5), 60.0)
+    });
+    b.finish().unwrap()
+}
+
+/// What is left out is gone, the rest stays, and a wish that cannot be granted is refused.
+#[test]
+fn every_effect_can_be_switched_off_or_says_why_not() {
+    let registry = Registry::builtin();
+    let full = everything(Omit::default());
+    let on = |scene: &Scene, wish: &str| -> Vec<&str> {
+        let decisions = survey(scene, wish, &registry.effects).unwrap().decisions;
+        decisions.iter().filter(|d| d.on).map(|d| d.name).collect()
+    };
+    let all = on(&full, "auto");
+    assert_eq!(all.len(), EFFECTS.len(), "{all:?}");
+    for e in EFFECTS {
+        let wish = format!("-{}", e.name);
+        let without = match e.acts {
+            Acts::Traced => on(&full, &wish),
+            Acts::Built(_) => {
+                assert!(survey(&full, &wish, &registry.effects).is_err(), "{wish}");
+                on(
+                    &everything(omissions(&wish, &registry.effects).unwrap()),
+                    &wish,
+                )
+            }
+            Acts::Always => {
+                assert!(survey(&full, &wish, &registry.effects).is_err(), "{wish}");
+                continue;
+            }
+        };
+        // What needs another is gone with it: light needs the only light, bumps are images.
+        let needs = |name: &str| match e.name {
+            "textures" => name == "normals",
+            "environment" => ["direct", "caustics", "indirect"].contains(&name),
+            _ => false,
+        };
+        let left: Vec<&str> = all
+            .iter()
+            .copied()
+            .filter(|n| *n != e.name && !needs(n))
+            .collect();
+        assert_eq!(without, left, "{wish}");
+    }
 }

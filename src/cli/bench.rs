@@ -74,7 +74,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<Ending> {
     }
     console::print(&record.line())?;
     Ok(match baseline {
-        Some(before) => judge(&record, &before, args.tolerance),
+        Some(before) => judge(&record, &before, args.tolerance)?,
         None => Ending::Done,
     })
 }
@@ -96,8 +96,18 @@ fn read_baseline(path: &Path) -> Result<Record> {
 }
 
 /// Tells what became worse.
-fn judge(now: &Record, before: &Record, tolerance: f64) -> Ending {
+///
+/// # Errors
+/// A baseline that says nothing about what was measured.
+fn judge(now: &Record, before: &Record, tolerance: f64) -> Result<Ending> {
     let (found, shared) = now.regressions(before, tolerance);
+    if shared == 0 {
+        return Err(Error::Usage(
+            "the baseline has nothing to compare with; measure the same scenes, backends and \
+             threads, both times with --repeats 3 or more"
+                .into(),
+        ));
+    }
     if (&now.processor, &now.isa) != (&before.processor, &before.isa) {
         console::say("warning: the baseline was measured on another machine");
     }
@@ -120,11 +130,11 @@ fn judge(now: &Record, before: &Record, tolerance: f64) -> Ending {
         found.len(),
         100.0 * tolerance
     ));
-    if found.is_empty() {
+    Ok(if found.is_empty() {
         Ending::Done
     } else {
         Ending::Different
-    }
+    })
 }
 
 /// A scene as a file, which goes away again if it was made up.

@@ -222,7 +222,7 @@ impl Report {
         }
         for e in &self.effects {
             let state = if e.on { "on" } else { "skipped" };
-            row("effect", format!("{:<11}{state:<9}{}", e.name, e.reason));
+            row("effect", format!("{:<13}{state:<9}{}", e.name, e.reason));
         }
         for n in &self.notes {
             row("note", n.clone());

@@ -1,6 +1,9 @@
 //! Keeping what there is of a rendering: images and film, now and then and at the end.
 
 use std::fmt::Write;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
 use std::time::Instant;
 
 use super::console;
@@ -8,6 +11,7 @@ use super::plan::Plan;
 use super::render::command_line;
 use crate::error::{Error, Result};
 use crate::film::Film;
+use crate::import;
 use crate::output::{self, Checkpoint, Metadata, fingerprint};
 use crate::pipeline::{RenderSettings, Standing};
 use crate::plugins::Registry;
@@ -102,8 +106,8 @@ impl<'a> Keeper<'a> {
     }
 }
 
-/// Says which scene and settings a film is of: the bytes of the scene's file, how it is read, and
-/// all settings but those that say when to end and with how many threads.
+/// Says which scene and settings a film is of: the bytes of all files of the scene, how it is read,
+/// and all settings but those that say when to end and with how many threads.
 fn identity(plan: &Plan, settings: &RenderSettings) -> Result<u64> {
     let same = RenderSettings {
         spp: 0,
@@ -114,7 +118,22 @@ fn identity(plan: &Plan, settings: &RenderSettings) -> Result<u64> {
     let mut text = String::new();
     // Writing to a string does not fail.
     let _ = write!(text, "{:?} {same:?}", plan.import);
-    let bytes = std::fs::read(&plan.scene)
-        .map_err(|e| Error::file(&plan.scene, e, "name a file that can be read"))?;
-    Ok(fingerprint(fingerprint(0, &bytes), text.as_bytes()))
+    let mut print = fingerprint(0, text.as_bytes());
+    for path in import::sources(&plan.scene, &plan.import)? {
+        print = contents(&path, print)
+            .map_err(|e| Error::file(&path, e, "name a file that can be read"))?;
+    }
+    Ok(print)
+}
+
+/// The fingerprint of a file, piece by piece, on top of another.
+fn contents(path: &Path, mut print: u64) -> io::Result<u64> {
+    let mut file = File::open(path)?;
+    let mut piece = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut piece)? {
+            0 => return Ok(print),
+            n => print = fingerprint(print, &piece[..n]),
+        }
+    }
 }

@@ -9,11 +9,11 @@ use super::values::{Size, Sky};
 use crate::effects;
 use crate::error::{Error, Result};
 use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits, SolidGlass};
-use crate::integrators::{IntegratorSettings, suited};
+use crate::integrators::{IntegratorSettings, PhotonNeeds, suited};
 use crate::output::{self, OutputSettings};
 use crate::pipeline::{PixelSampling, Progressive, RenderSettings};
 use crate::plugins::Registry;
-use crate::scene::Scene;
+use crate::scene::{Omit, Scene};
 
 /// Width of an image whose size is not given.
 const DEFAULT_WIDTH: u32 = 512;
@@ -90,7 +90,10 @@ impl Plan {
         }
         let plan = Self {
             scene: args.scene.file.clone(),
-            import: import_options(&args.scene),
+            import: ImportOptions {
+                omit: effects::omissions(&effects, &registry.effects)?,
+                ..import_options(&args.scene)
+            },
             outputs: args.outputs.clone(),
             output_settings: OutputSettings {
                 exposure: args.exposure,
@@ -153,6 +156,24 @@ impl Plan {
             || a.emission.is_some();
         let (entry, why) = suited(&registry.integrators, scene, effects.set, photons)?;
         Ok((entry.name, why))
+    }
+
+    /// Options that were given and that an integrator has no use for.
+    pub fn idle_options(&self, needs: PhotonNeeds) -> Vec<&'static str> {
+        let a = &self.args;
+        let photons = needs == PhotonNeeds::None;
+        let gather = needs != PhotonNeeds::All;
+        [
+            ("--photons", gather && a.photons.is_some()),
+            ("--gather", gather && a.gather.is_some()),
+            ("--shadow-rays", gather && a.shadow_rays.is_some()),
+            ("--caustic-photons", photons && a.caustic_photons.is_some()),
+            ("--nearest", photons && a.nearest.is_some()),
+            ("--emission", photons && a.emission.is_some()),
+        ]
+        .into_iter()
+        .filter_map(|(name, idle)| idle.then_some(name))
+        .collect()
     }
 
     /// The settings for a scene, whose camera may settle the image's size.
@@ -253,6 +274,7 @@ pub fn import_options(args: &SceneArgs) -> ImportOptions {
             rotation: args.environment_rotation.to_radians(),
             seen_by_camera: true,
         }),
+        omit: Omit::default(),
     }
 }
 

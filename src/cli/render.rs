@@ -47,6 +47,12 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
     let (integrator, reason) = plan.integrator_for(&scene, &registry)?;
     let settings = plan.settings_for(&scene, integrator)?;
     if !plan.quiet {
+        let needs = registry.integrators.find(integrator)?.photons;
+        for option in plan.idle_options(needs) {
+            console::say(format_args!(
+                "warning: {option} has no meaning for the integrator {integrator}"
+            ));
+        }
         let census = Census::new(&scene);
         if integrator == "path" && census.delta_lights > 0 && census.sharp_objects > 0 {
             console::say(format_args!(

@@ -86,7 +86,7 @@ pub(super) fn table(s: &Summary) -> String {
     ));
     for d in &s.rendering.effects {
         let state = if d.on { "on" } else { "skipped" };
-        rows.push(("effect", format!("{:<11}{state:<9}{}", d.name, d.reason)));
+        rows.push(("effect", format!("{:<13}{state:<9}{}", d.name, d.reason)));
     }
     if statistics.rejected_pixels > 0 {
         let n = statistics.rejected_pixels;

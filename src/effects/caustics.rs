@@ -1,12 +1,13 @@
 //! Caustics: need a light, something that redirects it, and a diffuse receiver.
 
-use super::{EffectEntry, EffectSet, Verdict, lights};
+use super::{Acts, EffectEntry, EffectSet, Verdict, lights};
 
 /// The table's line.
 pub(super) const ENTRY: EffectEntry = EffectEntry {
     name: "caustics",
     doc: "light focused onto diffuse surfaces by mirrors and glass, from the caustic photon map",
     bit: EffectSet::CAUSTICS,
+    acts: Acts::Traced,
     verdict: |c| {
         if c.specular_objects == 0 {
             Verdict::off("nothing reflects or transmits light onto other surfaces")

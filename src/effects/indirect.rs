@@ -1,12 +1,13 @@
 //! Indirect light: needs a light and a diffuse surface that passes it on.
 
-use super::{EffectEntry, EffectSet, Verdict, lights};
+use super::{Acts, EffectEntry, EffectSet, Verdict, lights};
 
 /// The table's line.
 pub(super) const ENTRY: EffectEntry = EffectEntry {
     name: "indirect",
     doc: "light that comes by way of other diffuse surfaces, from the global photon map",
     bit: EffectSet::INDIRECT,
+    acts: Acts::Traced,
     verdict: |c| {
         if lights(c) == 0 {
             Verdict::off("nothing emits light")

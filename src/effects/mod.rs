@@ -4,20 +4,33 @@
 //!
 //! The survey is conservative: it may keep an effect needlessly, but never drop a needed one.
 
+mod absorption;
+mod alpha;
+mod anisotropy;
 mod caustics;
+mod coat;
 mod direct;
+mod dispersion;
+mod environment;
 mod indirect;
+mod instances;
+mod iridescence;
+mod lens;
+mod normals;
 mod refraction;
+mod sheen;
 mod specular;
+mod textures;
+mod translucency;
 
 use bitflags::bitflags;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::geometry::SurfacePoint;
-use crate::materials::LobeClass;
+use crate::materials::{Features, LobeClass};
 use crate::registry::Table;
-use crate::scene::{Census, Scene};
+use crate::scene::{Census, Omit, Scene};
 
 bitflags! {
     /// A set of effects.
@@ -33,6 +46,32 @@ bitflags! {
         const CAUSTICS = 8;
         /// Light that comes by way of other diffuse surfaces.
         const INDIRECT = 16;
+        /// Light absorbed by bodies.
+        const ABSORPTION = 1 << 5;
+        /// Colours that glass takes apart.
+        const DISPERSION = 1 << 6;
+        /// Values from images.
+        const TEXTURES = 1 << 7;
+        /// Shading normals from images.
+        const NORMALS = 1 << 8;
+        /// Surfaces that are not whole.
+        const ALPHA = 1 << 9;
+        /// Light from all around.
+        const ENVIRONMENT = 1 << 10;
+        /// Depth of field.
+        const LENS = 1 << 11;
+        /// Shapes that are kept once and stand in several places.
+        const INSTANCES = 1 << 12;
+        /// Clear coats.
+        const COAT = 1 << 13;
+        /// The sheen of cloth.
+        const SHEEN = 1 << 14;
+        /// Thin films.
+        const IRIDESCENCE = 1 << 15;
+        /// Brushed surfaces.
+        const ANISOTROPY = 1 << 16;
+        /// Diffuse light that comes through.
+        const TRANSLUCENCY = 1 << 17;
     }
 }
 
@@ -97,6 +136,17 @@ pub struct Decision {
     pub reason: String,
 }
 
+/// When it is decided whether an effect is simulated.
+#[derive(Clone, Copy, Debug)]
+pub enum Acts {
+    /// While light is traced.
+    Traced,
+    /// When the scene is built: it is part of it or left out, and costs nothing then.
+    Built(fn(&mut Omit)),
+    /// Never: it is how the scene is kept.
+    Always,
+}
+
 /// An effect that can be surveyed.
 #[derive(Clone, Copy, Debug)]
 pub struct EffectEntry {
@@ -106,6 +156,8 @@ pub struct EffectEntry {
     pub doc: &'static str,
     /// Its bit.
     pub bit: EffectSet,
+    /// What switches it.
+    pub acts: Acts,
     /// Decides from what the scene holds.
     pub verdict: fn(&Census) -> Verdict,
 }
@@ -119,6 +171,19 @@ pub static EFFECTS: &[EffectEntry] = &[
     refraction::ENTRY,
     caustics::ENTRY,
     indirect::ENTRY,
+    absorption::ENTRY,
+    dispersion::ENTRY,
+    translucency::ENTRY,
+    coat::ENTRY,
+    sheen::ENTRY,
+    iridescence::ENTRY,
+    anisotropy::ENTRY,
+    textures::ENTRY,
+    normals::ENTRY,
+    alpha::ENTRY,
+    environment::ENTRY,
+    lens::ENTRY,
+    instances::ENTRY,
 ];
 
 /// What the survey found.
@@ -130,58 +195,102 @@ pub struct Effects {
     pub decisions: Vec<Decision>,
 }
 
+/// What the user asked for.
+struct Wish {
+    forced: EffectSet,
+    banned: EffectSet,
+}
+
+impl Wish {
+    fn parse(wish: &str, table: &Table<EffectEntry>) -> Result<Self> {
+        let mut out = Self {
+            forced: EffectSet::empty(),
+            banned: EffectSet::empty(),
+        };
+        let words = wish.split(',').map(str::trim);
+        for word in words.filter(|w| !w.is_empty() && *w != "auto") {
+            if word == "all" {
+                out.forced = EffectSet::all();
+                continue;
+            }
+            let (target, name) = match word.split_at_checked(1) {
+                Some(("+", name)) => (&mut out.forced, name),
+                Some(("-", name)) => (&mut out.banned, name),
+                _ => {
+                    return Err(Error::Usage(format!(
+                        "--effects '{word}' is neither auto, all, +NAME nor -NAME"
+                    )));
+                }
+            };
+            target.insert(table.find(name)?.bit);
+        }
+        Ok(out)
+    }
+}
+
+/// What a wish wants left out of the scene when it is built.
+///
+/// # Errors
+/// A wish that names no effect.
+pub fn omissions(wish: &str, table: &Table<EffectEntry>) -> Result<Omit> {
+    let banned = Wish::parse(wish, table)?.banned;
+    let mut omit = Omit::default();
+    for e in table.entries().iter().filter(|e| banned.contains(e.bit)) {
+        if let Acts::Built(leave_out) = e.acts {
+            leave_out(&mut omit);
+        }
+    }
+    Ok(omit)
+}
+
 /// Surveys a scene. `wish` is what the user asked for: `auto`, `all`, or a comma-separated list
 /// of `+name` and `-name` that override the survey.
 ///
 /// # Errors
-/// A wish that names no effect.
+/// A wish that names no effect, or is against one that is part of the scene: see [`omissions`].
 pub fn survey(scene: &Scene, wish: &str, table: &Table<EffectEntry>) -> Result<Effects> {
     let census = Census::new(scene);
-    let mut forced = EffectSet::empty();
-    let mut banned = EffectSet::empty();
-    for word in wish
-        .split(',')
-        .map(str::trim)
-        .filter(|w| !w.is_empty() && *w != "auto")
-    {
-        if word == "all" {
-            forced = EffectSet::all();
-            continue;
-        }
-        let (target, name) = match word.split_at_checked(1) {
-            Some(("+", name)) => (&mut forced, name),
-            Some(("-", name)) => (&mut banned, name),
-            _ => {
-                return Err(Error::Usage(format!(
-                    "--effects '{word}' is neither auto, all, +NAME nor -NAME"
-                )));
-            }
-        };
-        let entry = table.find(name)?;
-        target.insert(entry.bit);
-    }
+    let Wish { forced, banned } = Wish::parse(wish, table)?;
     let mut set = EffectSet::empty();
-    let decisions = table
-        .entries()
-        .iter()
-        .map(|e| {
-            let found = (e.verdict)(&census);
-            let verdict = if banned.contains(e.bit) {
-                Verdict::off("switched off by --effects")
-            } else if forced.contains(e.bit) && !found.on {
-                Verdict::on(format!("forced by --effects, although {}", found.reason))
-            } else {
-                found
+    let mut decisions = Vec::new();
+    for e in table.entries() {
+        let found = (e.verdict)(&census);
+        let traced = matches!(e.acts, Acts::Traced);
+        if banned.contains(e.bit) && found.on && !traced {
+            let remedy = match e.acts {
+                Acts::Built(_) => "leave it out when the scene is built",
+                _ => "it cannot be left out",
             };
-            set.set(e.bit, verdict.on);
-            Decision {
-                name: e.name,
-                on: verdict.on,
-                reason: verdict.reason,
-            }
-        })
-        .collect();
+            return Err(Error::Usage(format!(
+                "--effects -{}: {}; {remedy}",
+                e.name, found.reason
+            )));
+        }
+        let verdict = if banned.contains(e.bit) {
+            Verdict::off("switched off by --effects")
+        } else if forced.contains(e.bit) && !found.on && traced {
+            Verdict::on(format!("forced by --effects, although {}", found.reason))
+        } else {
+            found
+        };
+        set.set(e.bit, verdict.on);
+        decisions.push(Decision {
+            name: e.name,
+            on: verdict.on,
+            reason: verdict.reason,
+        });
+    }
     Ok(Effects { set, decisions })
+}
+
+/// The verdict on a feature of materials: "3 material(s): each " and what it does.
+fn with_feature(census: &Census, feature: Features, does: &str) -> Verdict {
+    let with = |f: &&Features| f.contains(feature);
+    match census.material_features.iter().filter(with).count() {
+        0 => Verdict::off(format!("no material {does}")),
+        1 => Verdict::on(format!("1 material {does}")),
+        n => Verdict::on(format!("{n} materials, each of which {does}")),
+    }
 }
 
 /// Whether anything emits; nearly every verdict begins with it.

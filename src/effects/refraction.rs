@@ -1,12 +1,13 @@
 //! Bent transmission: needs a body (`KHR_materials_volume`) and an index other than one.
 
-use super::{EffectEntry, EffectSet, Verdict};
+use super::{Acts, EffectEntry, EffectSet, Verdict};
 
 /// The table's line.
 pub(super) const ENTRY: EffectEntry = EffectEntry {
     name: "refraction",
     doc: "light bent on its way through solid glass and water",
     bit: EffectSet::REFRACTION,
+    acts: Acts::Traced,
     verdict: |c| {
         if c.traits.refracts {
             Verdict::on("a transmitting body has an index of refraction other than 1")

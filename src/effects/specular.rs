@@ -1,12 +1,13 @@
 //! Mirror-like and glossy reflection.
 
-use super::{EffectEntry, EffectSet, Verdict};
+use super::{Acts, EffectEntry, EffectSet, Verdict};
 
 /// The table's line.
 pub(super) const ENTRY: EffectEntry = EffectEntry {
     name: "specular",
     doc: "what is seen in mirrors, in glossy surfaces and through glass",
     bit: EffectSet::SPECULAR,
+    acts: Acts::Traced,
     verdict: |c| {
         if c.specular_objects == 0 {
             Verdict::off("no material reflects like a mirror or transmits")

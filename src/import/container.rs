@@ -24,16 +24,8 @@ pub(super) fn open(
     path: &Path,
     check: impl FnOnce(&Cursor<'_>) -> Result<(), Problem>,
 ) -> Result<Document, Problem> {
-    let unreadable = |e: io::Error| Problem::file(path, &e);
-    let file = Buffer::open(path).map_err(unreadable)?;
+    let (file, parts, json) = open_json(path)?;
     let mut size = file.len();
-    let parts = split(&file, path)?;
-    let text = file.read(parts.json.0, parts.json.1).map_err(unreadable)?;
-    let json: Value = serde_json::from_slice(&text).map_err(|e| {
-        let place = format!("line {} column {}", e.line(), e.column());
-        Problem::invalid(&place, format!("is not JSON ({e})"))
-    })?;
-    drop(text);
     let root = Cursor::root(&json);
     check_version(&root)?;
     schema::check(&root)?;
@@ -52,6 +44,24 @@ pub(super) fn open(
         buffers,
         size,
     })
+}
+
+/// The JSON of the file at `path`, as it stands.
+pub(super) fn json(path: &Path) -> Result<Value, Problem> {
+    open_json(path).map(|(_, _, json)| json)
+}
+
+fn open_json(path: &Path) -> Result<(Buffer, Parts, Value), Problem> {
+    let unreadable = |e: io::Error| Problem::file(path, &e);
+    let file = Buffer::open(path).map_err(unreadable)?;
+    let parts = split(&file, path)?;
+    let text = file.read(parts.json.0, parts.json.1).map_err(unreadable)?;
+    let json: Value = serde_json::from_slice(&text).map_err(|e| {
+        let place = format!("line {} column {}", e.line(), e.column());
+        Problem::invalid(&place, format!("is not JSON ({e})"))
+    })?;
+    drop(text);
+    Ok((file, parts, json))
 }
 
 /// Where the parts of a file are: begin and length.
@@ -225,7 +235,7 @@ fn beside(uri: &Cursor<'_>, file: &Path) -> Result<PathBuf, Problem> {
     Ok(file.parent().unwrap_or(Path::new("")).join(&name))
 }
 
-fn percent_decode(text: &str) -> Option<Vec<u8>> {
+pub(super) fn percent_decode(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len());
     let mut bytes = text.bytes();
     while let Some(b) = bytes.next() {

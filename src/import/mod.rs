@@ -32,6 +32,7 @@ mod node;
 mod schema;
 mod skin;
 mod solid;
+mod sources;
 mod tangents;
 mod texture;
 mod used;
@@ -46,7 +47,7 @@ pub use crate::color::units::LightUnits;
 use crate::error::{Error, Result};
 use crate::lights::LightDesc;
 use crate::materials::MaterialDesc;
-use crate::scene::{Scene, SceneBuilder, ScenePlugins};
+use crate::scene::{Omit, Scene, SceneBuilder, ScenePlugins};
 use accessor::Source;
 pub use environment::{EnvironmentOption, EnvironmentSource};
 use hierarchy::Hierarchy;
@@ -55,6 +56,7 @@ pub use inventory::{AnimationInfo, Extensions, ImageInfo, Inventory, MaterialInf
 use json::Cursor;
 use node::Walker;
 pub use solid::SolidGlass;
+pub use sources::sources;
 
 /// How a file is to be read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -73,6 +75,8 @@ pub struct ImportOptions {
     pub variant: Option<String>,
     /// Light from all around, instead of the file's own.
     pub environment: Option<EnvironmentOption>,
+    /// What is left out, wherever the file has it.
+    pub omit: Omit,
 }
 
 /// Extensions that are honoured; a file may require them.
@@ -205,6 +209,7 @@ impl Notes {
 /// [`Error::Unsupported`] if it requires what Dualight cannot do.
 pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Result<Scene> {
     let mut builder = SceneBuilder::new(plugins);
+    builder.leave_out(options.omit);
     let mut notes = Notes::default();
     let document = container::open(path, |root| check_extensions(root, &mut notes))
         .map_err(|p| p.into_error(path))?;

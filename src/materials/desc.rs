@@ -182,7 +182,7 @@ impl MaterialDesc {
                 .as_f64()
                 .ok_or_else(|| format!("extras.dualight.priority {value} is no number"))?,
         };
-        let open = self.volume && self.transmission > 0.0 && self.metallic < 1.0;
+        let open = self.volume && self.transmission > 0.0;
         Ok(open.then_some(Medium {
             ior: self.ior,
             priority,

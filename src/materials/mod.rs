@@ -21,6 +21,7 @@ mod values;
 
 mod conductor;
 mod dielectric;
+mod features;
 mod lambert;
 mod mirror;
 mod pbr;
@@ -28,6 +29,7 @@ mod unlit;
 
 pub use bsdf::{Bsdf, BsdfSample, BsdfValue, FrameId, Matte, Scattering, TransportMode};
 pub use desc::{AlphaMode, Interior, MaterialDesc, MaterialTraits, Medium};
+pub use features::Features;
 pub use lobes::{CustomLobe, Lobe, LobeClass, LobeModel, LobeSample};
 pub use slots::TextureSlots;
 pub use thin_film::ThinFilm;

@@ -76,15 +76,9 @@ pub struct BoundingSphere {
 }
 
 impl BoundingSphere {
-    /// Radius of the beams of parallel light that hold it: a little more, so that rounding loses
-    /// no ray.
-    pub fn beam_radius(&self) -> f64 {
-        self.radius * (1.0 + 1e-6)
-    }
-
-    /// Area of a section of such a beam in m².
+    /// Area of the section of a beam of parallel light that just holds it, in m².
     pub fn beam_area(&self) -> f64 {
-        std::f64::consts::PI * self.beam_radius() * self.beam_radius()
+        std::f64::consts::PI * self.radius * self.radius
     }
 
     /// Smallest sphere around two spheres.

@@ -23,7 +23,7 @@ pub(super) fn leave(
         let (p, area) = match targets {
             // Beside the scene, on the disc that its shadow fills.
             None => {
-                let radius = around.beam_radius();
+                let radius = around.radius;
                 let frame = Frame::from_normal(distant.direction);
                 let [x, y] = warp::disc(second);
                 let p = around.center + (frame.x * x + frame.y * y - frame.z) * radius;

@@ -19,8 +19,8 @@ use crate::geometry::{
     TriangleMesh,
 };
 use crate::lights::{LightDesc, LightEntry};
-use crate::materials::{Material, MaterialDesc, MaterialEntry, Medium};
-use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3};
+use crate::materials::{Features, Material, MaterialDesc, MaterialEntry, Medium};
+use crate::math::{Aabb, DAffine3, DVec3};
 use crate::registry::Table;
 use crate::textures::Texture;
 
@@ -66,10 +66,23 @@ pub struct MeshPlacement {
     pub name: String,
 }
 
+/// What is left out of a scene although it is asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Omit {
+    /// Features of materials.
+    pub features: Features,
+    /// Light from all around.
+    pub environment: bool,
+    /// Apertures of cameras.
+    pub lens: bool,
+}
+
 /// Collects the parts of a scene.
 #[derive(Default)]
 pub struct SceneBuilder {
     plugins: ScenePlugins,
+    omit: Omit,
+    features: Vec<Features>,
     shapes: Vec<Shape>,
     materials: Vec<(
         Box<dyn Material>,
@@ -93,6 +106,11 @@ impl SceneBuilder {
             plugins,
             ..Self::default()
         }
+    }
+
+    /// Leaves something out of all that is added from now on.
+    pub fn leave_out(&mut self, omit: Omit) {
+        self.omit = omit;
     }
 
     /// Adds something the user should know.
@@ -143,6 +161,14 @@ impl SceneBuilder {
     /// # Errors
     /// An unknown kind, or a parameter that the kind rejects.
     pub fn add_material(&mut self, desc: &MaterialDesc) -> Result<MaterialId> {
+        let cut;
+        let desc = match self.omit.features.is_empty() {
+            true => desc,
+            false => {
+                cut = desc.without(self.omit.features);
+                &cut
+            }
+        };
         let table = &self.plugins.materials;
         let entry = match desc.extras.get("dualight_material") {
             Some(kind) => table.find(kind.as_str().unwrap_or_default())?,
@@ -170,6 +196,7 @@ impl SceneBuilder {
             desc.coverage(),
             medium,
         ));
+        self.features.push(desc.features());
         if let Some(slots) = &desc.textures {
             self.textures.extend(slots.iter().map(|(_, t)| t.clone()));
         }
@@ -183,11 +210,16 @@ impl SceneBuilder {
 
     /// Adds a light without surface; its `scene` is filled in later.
     pub fn add_light(&mut self, desc: LightDesc) {
-        self.lights.push(desc);
+        if !(self.omit.environment && desc.kind == "environment") {
+            self.lights.push(desc);
+        }
     }
 
     /// Adds a camera.
-    pub fn add_camera(&mut self, desc: CameraDesc) {
+    pub fn add_camera(&mut self, mut desc: CameraDesc) {
+        if self.omit.lens {
+            desc.lens = None;
+        }
         self.cameras.push(desc);
     }
 
@@ -234,6 +266,7 @@ impl SceneBuilder {
             materials,
             matte,
             material_names,
+            material_features: self.features,
             textures: self.textures,
             parallelograms: lights.iter().map(|l| l.parallelogram()).collect(),
             lights,
@@ -333,10 +366,7 @@ impl SceneBuilder {
             if d.strength.is_black() {
                 continue;
             }
-            d.scene = BoundingSphere {
-                radius: scene.radius * (1.0 + 1e-6),
-                ..scene
-            };
+            d.scene = scene;
             let light = (self.plugins.lights.find(d.kind)?.build)(&d)
                 .map_err(|e| Error::Usage(format!("light '{}': {e}", d.name)))?;
             if let Some(id) = object {

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use crate::geometry::Shape;
-use crate::materials::MaterialTraits;
+use crate::materials::{Features, MaterialTraits};
 
 /// Counts of what is in a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -31,6 +31,10 @@ pub struct Census {
     pub sharp_objects: usize,
     /// Lights without extent.
     pub delta_lights: usize,
+    /// Features of each material that some object uses.
+    pub material_features: Vec<Features>,
+    /// Cameras with an aperture.
+    pub lenses: usize,
     /// Whether some body absorbs light on its way.
     pub absorbs: bool,
 }
@@ -76,6 +80,9 @@ impl Census {
             };
         }
         c.materials = used.iter().filter(|u| **u).count();
+        let all = scene.material_features.iter().zip(&used);
+        c.material_features = all.filter(|(_, used)| **used).map(|(f, _)| *f).collect();
+        c.lenses = scene.cameras.iter().filter(|c| c.lens.is_some()).count();
         for (_, kind) in &scene.light_names {
             match c.lights.iter_mut().find(|(k, _)| k == kind) {
                 Some((_, n)) => *n += 1,

@@ -8,7 +8,7 @@ mod light_choice;
 mod media;
 mod precision;
 
-pub use builder::{Emission, MeshPlacement, SceneBuilder, ScenePlugins};
+pub use builder::{Emission, MeshPlacement, Omit, SceneBuilder, ScenePlugins};
 pub use census::Census;
 pub use light_choice::LightChoice;
 pub use media::{Crossing, Inside, Media};
@@ -21,7 +21,7 @@ use crate::geometry::{
     Footprint, Geometry, LightId, MaterialId, ObjectId, Ray, ScenePatches, Surface, SurfacePoint,
 };
 use crate::lights::{LiSample, Light, Parallelogram};
-use crate::materials::{Bsdf, Material, Matte, TransportMode};
+use crate::materials::{Bsdf, Features, Material, Matte, TransportMode};
 use crate::math::{Aabb, BoundingSphere, DVec3};
 use crate::textures::Texture;
 
@@ -31,6 +31,8 @@ pub struct Scene {
     pub geometry: Arc<Geometry>,
     /// Materials, named by [`MaterialId`].
     pub materials: Vec<Box<dyn Material>>,
+    /// What each of them has beyond a plain surface.
+    pub material_features: Vec<Features>,
     /// Reflectance of those that are [matte](Material::matte).
     pub matte: Vec<Option<Rgb>>,
     /// Names of the materials, for reports.

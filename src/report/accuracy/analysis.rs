@@ -176,7 +176,7 @@ pub(super) fn errors(runs: &[&Run], reference: &super::layers::Layers, scale: &S
 }
 
 impl Errors {
-    /// The smallest error of the whole picture that any seed has.
+    /// The error of the whole picture, the mean over the seeds.
     pub(super) fn smallest(&self) -> f64 {
         mean(&self.raw[0])
     }

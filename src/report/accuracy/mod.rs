@@ -52,7 +52,7 @@ impl Clock {
     fn of(self, run: &Run) -> f64 {
         match self {
             Self::Wall => run.seconds,
-            Self::Cpu => run.cpu_seconds.max(0.005),
+            Self::Cpu => run.cpu_seconds.max(1e-6),
         }
     }
 

@@ -165,7 +165,7 @@ pub fn csv(analysis: &Analysis) -> String {
                 l.bias.low,
                 l.bias.high,
                 of(whole.then(|| p.trimmed.value.to_string())),
-                of(flip.map(|f| format!("{},{},{}", f.value, f.low, f.high)))
+                flip.map_or(",,".into(), |f| format!("{},{},{}", f.value, f.low, f.high))
             );
         }
     }

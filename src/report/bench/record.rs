@@ -115,9 +115,13 @@ pub struct Regression {
     pub factor: f64,
 }
 
+/// Repeats of which the range says something about noise.
+const FEWEST_REPEATS: usize = 3;
+
 impl Record {
     /// What is worse than in `baseline` by more than `tolerance` and beyond the noise: the ranges
-    /// of all repeats, then and now, do not meet. Also: how many metrics both have.
+    /// of all repeats, then and now, do not meet. Also: how many metrics could be judged, since both
+    /// have them and, where they vary, often enough.
     pub fn regressions(&self, baseline: &Self, tolerance: f64) -> (Vec<Regression>, usize) {
         let mut shared = 0;
         let found = self
@@ -125,6 +129,10 @@ impl Record {
             .iter()
             .filter_map(|now| {
                 let before = baseline.results.iter().find(|b| b.key() == now.key())?;
+                let repeats = now.repeats.min(before.repeats);
+                if now.unit != "B" && repeats < FEWEST_REPEATS {
+                    return None;
+                }
                 shared += 1;
                 let factor = now.worse(before);
                 let apart = now.low > before.high || now.high < before.low;
@@ -303,7 +311,11 @@ mod tests {
         assert_eq!(count(&[120.0, 121.0, 119.0], 0.05), 0, "better");
         // Where less is better.
         let slow = record(&[1.2, 1.21, 1.19], false);
-        assert_eq!(slow.regressions(&record(&[1.0], false), 0.05).0.len(), 1);
+        let fast = record(&[1.0, 1.01, 0.99], false);
+        assert_eq!(slow.regressions(&fast, 0.05).0.len(), 1);
+        // One repeat says nothing of the noise.
+        let once = record(&[1.0], false);
+        assert_eq!(slow.regressions(&once, 0.05), (Vec::new(), 0));
         // What is new has nothing to be worse than.
         let mut other = record(&[1.0], true);
         other.results[0].scene = "t".into();

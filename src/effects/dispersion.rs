@@ -1,0 +1,13 @@
+//! Colours that glass takes apart (`KHR_materials_dispersion`).
+
+use super::{Acts, EffectEntry, EffectSet, with_feature};
+use crate::materials::Features;
+
+/// The table's line.
+pub(super) const ENTRY: EffectEntry = EffectEntry {
+    name: "dispersion",
+    doc: "colours that glass takes apart",
+    bit: EffectSet::DISPERSION,
+    acts: Acts::Built(|omit| omit.features |= Features::DISPERSION),
+    verdict: |c| with_feature(c, Features::DISPERSION, "bends colours apart"),
+};

@@ -1,0 +1,15 @@
+//! Light from all around.
+
+use super::{Acts, EffectEntry, EffectSet, Verdict};
+
+/// The table's line.
+pub(super) const ENTRY: EffectEntry = EffectEntry {
+    name: "environment",
+    doc: "light from all around",
+    bit: EffectSet::ENVIRONMENT,
+    acts: Acts::Built(|omit| omit.environment = true),
+    verdict: |c| match c.lights.iter().any(|(kind, _)| *kind == "environment") {
+        true => Verdict::on("the scene has a sky"),
+        false => Verdict::off("no light comes from all around"),
+    },
+};

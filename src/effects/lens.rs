@@ -1,0 +1,15 @@
+//! Depth of field: cameras with an aperture.
+
+use super::{Acts, EffectEntry, EffectSet, Verdict};
+
+/// The table's line.
+pub(super) const ENTRY: EffectEntry = EffectEntry {
+    name: "lens",
+    doc: "depth of field",
+    bit: EffectSet::LENS,
+    acts: Acts::Built(|omit| omit.lens = true),
+    verdict: |c| match c.lenses {
+        0 => Verdict::off("no camera has an aperture"),
+        n => Verdict::on(format!("{n} camera(s) with an aperture")),
+    },
+};

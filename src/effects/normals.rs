@@ -1,0 +1,13 @@
+//! Shading normals from images.
+
+use super::{Acts, EffectEntry, EffectSet, with_feature};
+use crate::materials::Features;
+
+/// The table's line.
+pub(super) const ENTRY: EffectEntry = EffectEntry {
+    name: "normals",
+    doc: "bumps from images of normals",
+    bit: EffectSet::NORMALS,
+    acts: Acts::Built(|omit| omit.features |= Features::NORMAL_MAPS),
+    verdict: |c| with_feature(c, Features::NORMAL_MAPS, "has an image of normals"),
+};

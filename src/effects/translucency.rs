@@ -1,0 +1,13 @@
+//! Diffuse light that comes through (`KHR_materials_diffuse_transmission`).
+
+use super::{Acts, EffectEntry, EffectSet, with_feature};
+use crate::materials::Features;
+
+/// The table's line.
+pub(super) const ENTRY: EffectEntry = EffectEntry {
+    name: "translucency",
+    doc: "diffuse light through leaves and paper",
+    bit: EffectSet::TRANSLUCENCY,
+    acts: Acts::Built(|omit| omit.features |= Features::TRANSLUCENCY),
+    verdict: |c| with_feature(c, Features::TRANSLUCENCY, "lets diffuse light through"),
+};
