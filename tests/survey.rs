@@ -168,7 +168,12 @@ fn no_scene_loses_light_to_the_survey() {
         assert_eq!(picture("auto"), picture("all"), "round {round}");
     }
     println!("scenes without each effect: {skipped:?}");
-    assert!(skipped.iter().all(|n| *n > 0), "{skipped:?}");
+    // Of those that are decided while light is traced, each is dropped now and then.
+    let mut traced = EFFECTS.iter().zip(&skipped);
+    assert!(
+        traced.all(|(e, n)| *n > 0 || !matches!(e.acts, Acts::Traced)),
+        "{skipped:?}"
+    );
 }
 
 /// Each of the two parts of what is seen in glass can be left out, by both integrators alike, and
