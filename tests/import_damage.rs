@@ -156,6 +156,23 @@ fn a_damaged_rich_file_never_panics() {
     shake(&a, 1, 2000);
 }
 
+/// Where nothing but packed views lies in a buffer, it needs no bytes: under either name.
+#[test]
+fn placeholders_need_no_bytes() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.gltf");
+    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        for fallback in [true, false] {
+            let mut file: Value = serde_json::from_str(&rich().text()).unwrap();
+            let buffers = file["buffers"].as_array_mut().unwrap();
+            buffers.push(json!({"byteLength": 100, "extensions": {name: {"fallback": fallback}}}));
+            fs::write(&path, file.to_string()).unwrap();
+            let read = load(&path, &ImportOptions::default(), ScenePlugins::default());
+            assert_eq!(read.is_ok(), fallback, "{name}");
+        }
+    }
+}
+
 #[cfg(feature = "meshopt")]
 fn packed_by_meshopt() -> Asset {
     let mut a = Asset::new();

@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use super::buffer::Buffer;
 use super::json::Cursor;
+use super::views::COMPRESSION;
 use super::{Problem, schema};
 
 /// A parsed file.
@@ -178,11 +179,10 @@ fn read_buffer(
     Ok(data.part(0, length))
 }
 
-/// Whether a buffer is a placeholder for what `EXT_meshopt_compression` unpacks.
+/// Whether a buffer is a placeholder for what is unpacked into it.
 fn is_fallback(buffer: &Cursor<'_>) -> bool {
-    buffer
-        .extension("EXT_meshopt_compression")
-        .is_some_and(|e| e.flag("fallback"))
+    let mut packed = COMPRESSION.iter().filter_map(|name| buffer.extension(name));
+    packed.any(|e| e.flag("fallback"))
 }
 
 /// Most buffers whose files stay open.

@@ -41,7 +41,7 @@ enum Data<'a> {
 }
 
 /// The extensions that compress a view. They differ in name only.
-const COMPRESSION: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+pub(super) const COMPRESSION: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// What a file may grow to when it is decoded: a small file has room for a scene, a large one for
 /// the best that compression does. A few bytes that claim gigabytes are refused.
