@@ -196,12 +196,20 @@ unsafe impl Send for CommittedScene {}
 unsafe impl Sync for CommittedScene {}
 
 impl CommittedScene {
-    /// The closest hit of a ray.
+    /// The closest hit of a ray that filters let count; `key` is what they tell rays apart by,
+    /// asked for only if there are any.
     #[inline]
     #[must_use]
-    pub fn intersect(&self, org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> Option<RawHit> {
+    pub fn intersect(
+        &self,
+        org: [f32; 3],
+        dir: [f32; 3],
+        tnear: f32,
+        tfar: f32,
+        key: impl FnOnce() -> u64,
+    ) -> Option<RawHit> {
         if self.filtered {
-            return self.intersect_filtered(org, dir, tnear, tfar, 0);
+            return self.intersect_filtered(org, dir, tnear, tfar, key());
         }
         if !is_ray(org, dir, tnear, tfar) {
             return None;
@@ -214,10 +222,8 @@ impl CommittedScene {
         raw_hit(&query)
     }
 
-    /// The closest hit of a ray that filters let count; `key` is what they tell rays apart by.
     #[inline(never)]
-    #[must_use]
-    pub fn intersect_filtered(
+    fn intersect_filtered(
         &self,
         org: [f32; 3],
         dir: [f32; 3],
@@ -239,10 +245,8 @@ impl CommittedScene {
         raw_hit(&query)
     }
 
-    /// Whether a ray hits anything that filters let count.
     #[inline(never)]
-    #[must_use]
-    pub fn occluded_filtered(
+    fn occluded_filtered(
         &self,
         org: [f32; 3],
         dir: [f32; 3],
@@ -261,12 +265,20 @@ impl CommittedScene {
         ray.tfar < 0.0
     }
 
-    /// Whether a ray hits anything.
+    /// Whether a ray hits anything that filters let count; `key` as in
+    /// [`intersect`](Self::intersect).
     #[inline]
     #[must_use]
-    pub fn occluded(&self, org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> bool {
+    pub fn occluded(
+        &self,
+        org: [f32; 3],
+        dir: [f32; 3],
+        tnear: f32,
+        tfar: f32,
+        key: impl FnOnce() -> u64,
+    ) -> bool {
         if self.filtered {
-            return self.occluded_filtered(org, dir, tnear, tfar, 0);
+            return self.occluded_filtered(org, dir, tnear, tfar, key());
         }
         if !is_ray(org, dir, tnear, tfar) {
             return false;
@@ -327,10 +339,15 @@ impl CommittedScene {
 /// What a query found.
 #[inline]
 fn raw_hit(RayHit { ray, hit }: &RayHit) -> Option<RawHit> {
-    (hit.geom != INVALID_ID).then_some(RawHit {
-        t: ray.tfar,
-        u: hit.u,
-        v: hit.v,
+    // The library has just written single numbers here. A compiler that loads a vector which holds
+    // one of them makes the processor wait until all of it is in the cache; told not to touch the
+    // load, it loads what was written.
+    // SAFETY: a reference is valid for reads.
+    let single = |value: &f32| unsafe { ptr::read_volatile(value) };
+    (hit.geom != INVALID_ID).then(|| RawHit {
+        t: single(&ray.tfar),
+        u: single(&hit.u),
+        v: single(&hit.v),
         prim: hit.prim,
         geom: hit.geom,
         inst: hit.inst,
@@ -340,10 +357,10 @@ fn raw_hit(RayHit { ray, hit }: &RayHit) -> Option<RawHit> {
 /// Whether Embree may see this ray.
 #[inline]
 fn is_ray(org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> bool {
-    let all = [org[0], org[1], org[2], dir[0], dir[1], dir[2]];
-    // A sum is only finite if all its terms are; if it is not, it may have overflowed.
-    let sum = (all[0] + all[1]) + (all[2] + all[3]) + (all[4] + all[5]);
-    let finite = sum.abs() < f32::INFINITY || all.iter().all(|x| x.is_finite());
+    // A sum of sizes is only finite if all of them are; if it is not, it may have overflowed.
+    let length = dir[0].abs() + dir[1].abs() + dir[2].abs();
+    let sum = length + (org[0].abs() + org[1].abs() + org[2].abs());
+    let finite = sum < f32::INFINITY || org.iter().chain(&dir).all(|x| x.is_finite());
     // Comparisons with what is not a number are false.
-    finite && dir != [0.0; 3] && 0.0 <= tnear && tnear <= tfar && tnear < f32::INFINITY
+    finite && length > 0.0 && 0.0 <= tnear && tnear <= tfar && tnear < f32::INFINITY
 }

@@ -39,7 +39,7 @@ fn moved(by: [f32; 3]) -> [[f32; 3]; 4] {
 
 /// The closest hit towards +z, from a point.
 fn look_up(scene: &CommittedScene, org: [f32; 3]) -> Option<RawHit> {
-    scene.intersect(org, [0.0, 0.0, 1.0], 0.0, FAR)
+    scene.intersect(org, [0.0, 0.0, 1.0], 0.0, FAR, || 0)
 }
 
 /// Equal but for the last digits, which differ between processors.
@@ -67,7 +67,7 @@ fn a_triangle_is_hit_where_it_is() {
     // From the other side too, but not beside it.
     assert!(
         scene
-            .intersect([0.25, 0.5, 3.0], [0.0, 0.0, -1.0], 0.0, FAR)
+            .intersect([0.25, 0.5, 3.0], [0.0, 0.0, -1.0], 0.0, FAR, || 0)
             .is_some()
     );
     assert_eq!(look_up(&scene, [0.75, 0.75, -2.0]), None);
@@ -88,7 +88,7 @@ fn a_distance_counts_in_lengths_of_the_direction() {
     let device = device();
     let scene = scene(&device, &[(0, &triangle(&device))]);
     let hit = scene
-        .intersect([0.25, 0.25, -2.0], [0.0, 0.0, 4.0], 0.0, FAR)
+        .intersect([0.25, 0.25, -2.0], [0.0, 0.0, 4.0], 0.0, FAR, || 0)
         .expect("a hit");
     assert!(near(hit.t, 0.5), "{hit:?}");
 }
@@ -105,12 +105,12 @@ fn only_what_lies_on_the_segment_counts() {
         (1.5, 2.5, true),
     ] {
         assert_eq!(
-            scene.intersect(org, up, tnear, tfar).is_some(),
+            scene.intersect(org, up, tnear, tfar, || 0).is_some(),
             expected,
             "{tnear}..{tfar}"
         );
         assert_eq!(
-            scene.occluded(org, up, tnear, tfar),
+            scene.occluded(org, up, tnear, tfar, || 0),
             expected,
             "{tnear}..{tfar}"
         );
@@ -233,7 +233,7 @@ fn an_empty_scene_is_never_hit() {
         scene(&device, &[(0, &empty), (1, &none)]),
     ] {
         assert_eq!(look_up(&scene, [0.0; 3]), None);
-        assert!(!scene.occluded([0.0; 3], [0.0, 0.0, 1.0], 0.0, FAR));
+        assert!(!scene.occluded([0.0; 3], [0.0, 0.0, 1.0], 0.0, FAR, || 0));
         assert_eq!(scene.bounds(), None);
     }
 }
@@ -263,15 +263,15 @@ fn a_malformed_ray_is_a_miss() {
         ],
     );
     let (org, up) = ([0.25, 0.25, -5.0], [0.0, 0.0, 1.0]);
-    assert!(scene.occluded(org, up, 0.0, FAR));
+    assert!(scene.occluded(org, up, 0.0, FAR, || 0));
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for axis in 0..3 {
             let (mut bad_org, mut bad_dir) = (org, up);
             bad_org[axis] = bad;
             bad_dir[axis] = bad;
             for (org, dir) in [(bad_org, up), (org, bad_dir)] {
-                assert_eq!(scene.intersect(org, dir, 0.0, FAR), None);
-                assert!(!scene.occluded(org, dir, 0.0, FAR));
+                assert_eq!(scene.intersect(org, dir, 0.0, FAR, || 0), None);
+                assert!(!scene.occluded(org, dir, 0.0, FAR, || 0));
             }
         }
     }
@@ -284,13 +284,16 @@ fn a_malformed_ray_is_a_miss() {
         (0.0, f32::NEG_INFINITY),
     ] {
         assert_eq!(
-            scene.intersect(org, up, tnear, tfar),
+            scene.intersect(org, up, tnear, tfar, || 0),
             None,
             "{tnear}..{tfar}"
         );
-        assert!(!scene.occluded(org, up, tnear, tfar), "{tnear}..{tfar}");
+        assert!(
+            !scene.occluded(org, up, tnear, tfar, || 0),
+            "{tnear}..{tfar}"
+        );
     }
-    assert_eq!(scene.intersect(org, [0.0; 3], 0.0, FAR), None);
+    assert_eq!(scene.intersect(org, [0.0; 3], 0.0, FAR, || 0), None);
 }
 
 #[test]

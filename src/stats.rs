@@ -29,6 +29,12 @@ impl RayCounts {
         self.photon += o.photon;
         self.check += o.check;
     }
+
+    /// The counts of two parts of the work together.
+    pub fn plus(mut self, o: Self) -> Self {
+        self.add(&o);
+        self
+    }
 }
 
 /// What became of the photons of one map.

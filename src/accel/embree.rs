@@ -32,13 +32,8 @@ impl Accelerator for Embree {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let (o, d) = (ray.o.into(), ray.d.into());
-        let h = if self.scene.has_filters() {
-            let key = ray_key(ray);
-            self.scene
-                .intersect_filtered(o, d, ray.tmin, ray.tmax, key)?
-        } else {
-            self.scene.intersect(o, d, ray.tmin, ray.tmax)?
-        };
+        let key = || ray_key(ray);
+        let h = self.scene.intersect(o, d, ray.tmin, ray.tmax, key)?;
         Some(Hit {
             t: h.t,
             u: h.u,
@@ -51,11 +46,8 @@ impl Accelerator for Embree {
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
         let (o, d) = (ray.o.into(), ray.d.into());
-        if self.scene.has_filters() {
-            let key = ray_key(ray);
-            return self.scene.occluded_filtered(o, d, ray.tmin, ray.tmax, key);
-        }
-        self.scene.occluded(o, d, ray.tmin, ray.tmax)
+        let key = || ray_key(ray);
+        self.scene.occluded(o, d, ray.tmin, ray.tmax, key)
     }
 
     fn stats(&self) -> BuildStats {

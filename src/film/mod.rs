@@ -129,6 +129,7 @@ pub struct Film {
     sums: Vec<[f32; VALUES]>,
     counts: Vec<u32>,
     rejected: u64,
+    /// Row and column, so that the smallest is the first.
     first_rejected: Option<[u32; 2]>,
     kept: [bool; 4],
     passes: Option<passes::Passes>,
@@ -222,14 +223,15 @@ impl Film {
         self.height
     }
 
-    /// Pixels whose tile sum was not finite and was left out: a bug if ever above zero.
+    /// Sums of a pixel over a tile's samples that were left out, since they or the pixel's sum with
+    /// them were not finite: a bug if ever above zero.
     pub fn rejected(&self) -> u64 {
         self.rejected
     }
 
-    /// The first pixel (column, row) whose sum was left out.
+    /// The first pixel (column, row), row by row, of which a sum was left out.
     pub fn first_rejected(&self) -> Option<[u32; 2]> {
-        self.first_rejected
+        self.first_rejected.map(|[row, column]| [column, row])
     }
 
     /// Adds the samples of a tile.
@@ -243,18 +245,20 @@ impl Film {
                     values[3 * k..3 * k + 3].fill(0.0);
                 }
             }
-            if values.iter().all(|v| v.is_finite()) {
-                for (a, v) in self.sums[i].iter_mut().zip(values) {
-                    *a += v;
-                }
+            let mut with = self.sums[i];
+            for (a, v) in with.iter_mut().zip(values) {
+                *a += v;
+            }
+            if with.iter().all(|v| v.is_finite()) {
+                self.sums[i] = with;
                 self.counts[i] += tile.samples;
                 if let Some(p) = &mut self.passes {
                     p.add(i, &values, tile.samples);
                 }
             } else {
                 self.rejected += 1;
-                let at = [tile.x + dx, tile.y + dy];
-                self.first_rejected.get_or_insert(at);
+                let at = [tile.y + dy, tile.x + dx];
+                self.first_rejected = Some(self.first_rejected.map_or(at, |first| first.min(at)));
             }
         }
     }
@@ -383,20 +387,45 @@ mod tests {
         assert_eq!(image.rgb("caustics").map(|v| v[4]), Some([1.0; 3]));
     }
 
-    #[test]
-    fn a_sum_that_is_not_finite_is_left_out_and_counted() {
-        let mut film = Film::new(1, 1);
+    fn tile_of(x: u32, y: u32, radiance: f64) -> Tile {
         let mut s = PixelSample::default();
-        s.add(Component::Direct, Rgb::splat(f64::NAN));
-        film.add(&Tile {
-            x: 0,
-            y: 0,
+        s.add(Component::Direct, Rgb::splat(radiance));
+        Tile {
+            x,
+            y,
             width: 1,
             height: 1,
             sums: vec![s],
             samples: 1,
-        });
-        assert_eq!((film.rejected(), film.sample_range()), (1, (0, 0)));
-        assert_eq!(film.first_rejected(), Some([0, 0]));
+        }
+    }
+
+    #[test]
+    fn a_sum_that_is_not_finite_is_left_out_and_counted() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e39] {
+            let mut film = Film::new(1, 1);
+            film.add(&tile_of(0, 0, bad));
+            assert_eq!((film.rejected(), film.sample_range()), (1, (0, 0)), "{bad}");
+            assert_eq!(film.first_rejected(), Some([0, 0]));
+        }
+    }
+
+    #[test]
+    fn a_pixel_whose_sum_would_overflow_keeps_what_it_has() {
+        let mut film = Film::new(1, 1);
+        film.add(&tile_of(0, 0, 3e38));
+        film.add(&tile_of(0, 0, 3e38));
+        assert_eq!((film.rejected(), film.sample_range()), (1, (1, 1)));
+        let red = film.develop().rgb("direct").map(|v| v[0][0]);
+        assert_eq!(red, Some(3e38));
+    }
+
+    #[test]
+    fn the_first_pixel_left_out_does_not_depend_on_the_order_of_tiles() {
+        let mut film = Film::new(3, 2);
+        for [x, y] in [[0, 1], [2, 0], [1, 1]] {
+            film.add(&tile_of(x, y, f64::NAN));
+        }
+        assert_eq!((film.rejected(), film.first_rejected()), (3, Some([2, 0])));
     }
 }

@@ -7,6 +7,7 @@
 use arrayvec::ArrayVec;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use super::{BATCH, Integrator, Sample, Scratch, Spacing};
 use crate::cameras::Camera;
@@ -130,60 +131,60 @@ pub fn camera_pass(
     let mut done = start;
     while done < end && control.stopped().is_none() {
         let samples = done.clamp(1, MAX_PASS).min(end - done);
-        // Only as many tiles are held at a time as keep the threads busy.
         for group in tiles.chunks(1024) {
-            let seen = &*film;
-            let finished: Vec<Option<(Tile, RayCounts)>> = group
-                .par_iter()
-                .map(|&(x, y, w, h)| {
-                    if control.stopped().is_some() {
-                        return None;
+            // A tile is added by the thread that took it, and held no longer: tiles share no pixel,
+            // so their order does not matter.
+            let shared = Mutex::new(&mut *film);
+            let film = || shared.lock().unwrap_or_else(PoisonError::into_inner);
+            let counts = group.par_iter().map(|&(x, y, w, h)| {
+                if control.stopped().is_some() {
+                    return RayCounts::default();
+                }
+                let taken = {
+                    let film = film();
+                    let own = |i: u32| film.samples_of_pass(x + i % w, y + i / w);
+                    (0..w * h).map(own).max().unwrap_or(0)
+                };
+                let first = done.max(start + taken);
+                let Some(samples) = (done + samples).checked_sub(first).filter(|n| *n > 0) else {
+                    return RayCounts::default();
+                };
+                let mut scratch = Scratch::default();
+                let mut sums = vec![PixelSample::default(); (w * h) as usize];
+                let mut batch = ArrayVec::<Sample, BATCH>::new();
+                let mut take = |batch: &mut ArrayVec<Sample, BATCH>| {
+                    integrator.sample(batch, &mut sums, &mut scratch);
+                    batch.clear();
+                };
+                let pixels = (y..y + h).flat_map(|py| (x..x + w).map(move |px| (px, py)));
+                for (pixel, (px, py)) in pixels.enumerate() {
+                    // Which samples of a pixel go together must not depend on its neighbours,
+                    // or the rounding of its sum would.
+                    if batch.len() + samples as usize > BATCH {
+                        take(&mut batch);
                     }
-                    let own = |i: u32| seen.samples_of_pass(x + i % w, y + i / w);
-                    let first = done.max(start + (0..w * h).map(own).max().unwrap_or(0));
-                    let samples = (done + samples).checked_sub(first).filter(|n| *n > 0)?;
-                    let mut scratch = Scratch::default();
-                    let mut sums = vec![PixelSample::default(); (w * h) as usize];
-                    let mut batch = ArrayVec::<Sample, BATCH>::new();
-                    let mut take = |batch: &mut ArrayVec<Sample, BATCH>| {
-                        integrator.sample(batch, &mut sums, &mut scratch);
-                        batch.clear();
-                    };
-                    let pixels = (y..y + h).flat_map(|py| (x..x + w).map(move |px| (px, py)));
-                    for (pixel, (px, py)) in pixels.enumerate() {
-                        // Which samples of a pixel go together must not depend on its neighbours,
-                        // or the rounding of its sum would.
-                        if batch.len() + samples as usize > BATCH {
+                    let own = view.pixel([px, py]);
+                    for s in first..first + samples {
+                        batch.push(own.sample(s, pixel));
+                        if batch.is_full() {
                             take(&mut batch);
                         }
-                        let own = view.pixel([px, py]);
-                        for s in first..first + samples {
-                            batch.push(own.sample(s, pixel));
-                            if batch.is_full() {
-                                take(&mut batch);
-                            }
-                        }
                     }
-                    take(&mut batch);
-                    stage.advance(u64::from(w * h) * u64::from(samples));
-                    Some((
-                        Tile {
-                            x,
-                            y,
-                            width: w,
-                            height: h,
-                            sums,
-                            samples,
-                        },
-                        scratch.rays,
-                    ))
-                })
-                .collect();
-            for (tile, r) in finished.into_iter().flatten() {
-                film.add(&tile);
-                rays.add(&r);
-            }
-            watch(film);
+                }
+                take(&mut batch);
+                stage.advance(u64::from(w * h) * u64::from(samples));
+                film().add(&Tile {
+                    x,
+                    y,
+                    width: w,
+                    height: h,
+                    sums,
+                    samples,
+                });
+                scratch.rays
+            });
+            rays.add(&counts.reduce(RayCounts::default, RayCounts::plus));
+            watch(shared.into_inner().unwrap_or_else(PoisonError::into_inner));
         }
         done += samples;
     }

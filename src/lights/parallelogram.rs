@@ -36,14 +36,13 @@ impl Face {
         if !(d2 >= f64::MIN_POSITIVE) {
             return None;
         }
-        let d = d2.sqrt();
-        // The division does not wait for the root,
-        let wi = to * (d * (1.0 / d2));
-        // nor does the cosine times the distance.
         let cos = -to.dot(self.ng);
         if cos == 0.0 || (cos < 0.0 && !self.double_sided) {
             return None;
         }
+        let d = d2.sqrt();
+        // The division does not wait for the root.
+        let wi = to * (d * (1.0 / d2));
         Some(LiSample {
             wi,
             target: Some(on + self.ng * self.offset.copysign(cos)),
