@@ -218,7 +218,7 @@ fn every_sabotage_is_found() {
     fn struck(ray: &Ray) -> bool {
         dualight::geometry::ray_key(ray).is_multiple_of(64)
     }
-    let bugs: [(&str, fn(&Ray, Option<Hit>) -> Option<Hit>); 4] = [
+    let bugs: [(&str, fn(&Ray, Option<Hit>) -> Option<Hit>); 5] = [
         ("misses", |ray, hit| hit.filter(|_| !struck(ray))),
         ("invents", |ray, hit| {
             hit.or_else(|| {
@@ -238,6 +238,12 @@ fn every_sabotage_is_found() {
                 } else {
                     h.prim
                 },
+                ..h
+            })
+        }),
+        ("measures wrongly", |ray, hit| {
+            hit.map(|h| Hit {
+                t: if struck(ray) { 1.0001 * h.t } else { h.t },
                 ..h
             })
         }),

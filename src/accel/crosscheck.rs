@@ -135,6 +135,10 @@ impl CrossCheck<'_> {
             };
         };
         let pa = passage(&a);
+        let error = pa.error(&a);
+        if !(error <= 1.0) {
+            return (Class::Unexplained, "a distance that is wrong", error);
+        }
         if let Some(b) = reference {
             let pb = passage(&b);
             if (a.object, a.prim) == (b.object, b.prim) && pa.root == pb.root {

@@ -70,14 +70,14 @@ impl Plan {
     /// Names that no plugin has, extensions that no format has, options that contradict one
     /// another.
     pub fn new(args: &RenderArgs, registry: &Registry) -> Result<Self> {
-        // The defaults get their names here, for the reports.
         if let Some(name) = named_integrator(args) {
             registry.integrators.find(name)?;
         }
+        // Defaults get their names here, for the reports.
         let accelerator = registry.accelerators.choose(args.accel.as_deref())?;
         let emission = registry.emissions.choose(args.emission.as_deref())?;
         let effects = args.effects.clone().unwrap_or_else(|| "auto".into());
-        check_effects(&effects, registry)?;
+        let omit = effects::omissions(&effects, &registry.effects)?;
         for path in &args.outputs {
             output::format_of(&registry.outputs, path)?;
         }
@@ -91,7 +91,7 @@ impl Plan {
         let plan = Self {
             scene: args.scene.file.clone(),
             import: ImportOptions {
-                omit: effects::omissions(&effects, &registry.effects)?,
+                omit,
                 ..import_options(&args.scene)
             },
             outputs: args.outputs.clone(),
@@ -276,22 +276,6 @@ pub fn import_options(args: &SceneArgs) -> ImportOptions {
         }),
         omit: Omit::default(),
     }
-}
-
-/// Finds mistakes in `--effects` before a scene is loaded; what it means is the survey's.
-fn check_effects(wish: &str, registry: &Registry) -> Result<()> {
-    for word in wish.split(',').map(str::trim) {
-        if matches!(word, "auto" | "all") {
-            continue;
-        }
-        let name = word.strip_prefix(['+', '-']).ok_or_else(|| {
-            Error::Usage(format!(
-                "--effects '{word}' is neither auto, all, +NAME nor -NAME; see dualight plugins"
-            ))
-        })?;
-        registry.effects.find(name)?;
-    }
-    Ok(())
 }
 
 /// The size of an image for a camera of the given aspect, if it has one.

@@ -208,7 +208,7 @@ impl Wish {
             banned: EffectSet::empty(),
         };
         let words = wish.split(',').map(str::trim);
-        for word in words.filter(|w| !w.is_empty() && *w != "auto") {
+        for word in words.filter(|w| *w != "auto") {
             if word == "all" {
                 out.forced = EffectSet::all();
                 continue;
@@ -218,7 +218,8 @@ impl Wish {
                 Some(("-", name)) => (&mut out.banned, name),
                 _ => {
                     return Err(Error::Usage(format!(
-                        "--effects '{word}' is neither auto, all, +NAME nor -NAME"
+                        "--effects '{word}' is neither auto, all, +NAME nor -NAME; see dualight \
+                         plugins"
                     )));
                 }
             };
@@ -283,7 +284,8 @@ pub fn survey(scene: &Scene, wish: &str, table: &Table<EffectEntry>) -> Result<E
     Ok(Effects { set, decisions })
 }
 
-/// The verdict on a feature of materials: "3 material(s): each " and what it does.
+/// The verdict on a feature of materials: how many have it, and what it `does`, as in "1 material
+/// has a clear coat".
 fn with_feature(census: &Census, feature: Features, does: &str) -> Verdict {
     let with = |f: &&Features| f.contains(feature);
     match census.material_features.iter().filter(with).count() {

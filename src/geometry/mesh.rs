@@ -1,5 +1,7 @@
 //! Indexed triangle meshes.
 
+use rayon::prelude::*;
+
 use super::facet::Facet;
 use crate::math::{Aabb, DVec3, Vec3};
 
@@ -144,13 +146,16 @@ impl TriangleMesh {
 
     /// Box around the vertices that triangles use.
     pub fn bounds(&self) -> Aabb {
-        let mut b = Aabb::EMPTY;
-        for tri in &self.indices {
-            for &i in tri {
+        let around = |mut b: Aabb, triangles: &[[u32; 3]]| {
+            for &i in triangles.as_flattened() {
                 b.grow(Vec3::from(self.positions[i as usize]).as_dvec3());
             }
-        }
-        b
+            b
+        };
+        self.indices
+            .par_chunks(1 << 16)
+            .map(|part| around(Aabb::EMPTY, part))
+            .reduce(|| Aabb::EMPTY, Aabb::union)
     }
 }
 

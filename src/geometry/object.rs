@@ -10,6 +10,9 @@ use super::{
 };
 use crate::math::{Aabb, BoundingSphere, DAffine3, DVec3, Vec3};
 
+/// Smallest radius: its square must be a normal number of single precision.
+const LEAST_RADIUS: f32 = 1.084_202_2e-19;
+
 /// Analytic spheres in their own (object) space.
 #[derive(Clone, Debug, Default)]
 pub struct SphereSet {
@@ -18,14 +21,14 @@ pub struct SphereSet {
 }
 
 impl SphereSet {
-    /// Drops spheres that no backend can hold or that have no positive radius.
+    /// Drops spheres that no backend can hold or whose radius, beside none, is below 2⁻⁶³.
     pub fn drop_invalid(&mut self) -> Invalid {
         let mut dropped = Invalid::default();
         self.spheres.retain(|s| {
             if s.iter().any(|c| !(c.abs() <= COORDINATE_LIMIT)) {
                 dropped.coordinate += 1;
                 false
-            } else if s[3] <= f32::MIN_POSITIVE {
+            } else if !(s[3] >= LEAST_RADIUS) {
                 dropped.degenerate += 1;
                 false
             } else {
@@ -144,6 +147,29 @@ pub struct Object {
     pub name: Arc<str>,
 }
 
+impl Object {
+    /// World-space box around what lies in a box of object space.
+    fn carry(&self, b: Aabb) -> Aabb {
+        let Some(place) = &self.placement else {
+            return b;
+        };
+        let mut out = Aabb::EMPTY;
+        if b.is_empty() {
+            return out;
+        }
+        for k in 0..8 {
+            let pick = |bit: usize, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
+            let corner = DVec3::new(
+                pick(0, b.min.x, b.max.x),
+                pick(1, b.min.y, b.max.y),
+                pick(2, b.min.z, b.max.z),
+            );
+            out.grow(place.world_from_object.transform_point3(corner));
+        }
+        out
+    }
+}
+
 impl std::fmt::Debug for Object {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Object")
@@ -214,24 +240,7 @@ impl Geometry {
     /// World-space box of an object.
     pub fn object_bounds(&self, id: ObjectId) -> Aabb {
         let object = self.object(id);
-        let b = self.shape(object.shape).bounds();
-        let Some(place) = &object.placement else {
-            return b;
-        };
-        if b.is_empty() {
-            return b;
-        }
-        let mut out = Aabb::EMPTY;
-        for k in 0..8 {
-            let pick = |bit: usize, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
-            let corner = DVec3::new(
-                pick(0, b.min.x, b.max.x),
-                pick(1, b.min.y, b.max.y),
-                pick(2, b.min.z, b.max.z),
-            );
-            out.grow(place.world_from_object.transform_point3(corner));
-        }
-        out
+        object.carry(self.shape(object.shape).bounds())
     }
 
     /// World-space spheres around all objects. A mesh has its vertices to go by, not the corners of
@@ -255,9 +264,12 @@ impl Geometry {
 
     /// World-space box of everything.
     pub fn bounds(&self) -> Aabb {
-        (0..self.objects.len()).fold(Aabb::EMPTY, |b, i| {
-            b.union(self.object_bounds(ObjectId(i as u32)))
-        })
+        // Each shape is looked at once, however often it is placed.
+        let own: Vec<Aabb> = self.shapes.par_iter().map(Shape::bounds).collect();
+        self.objects
+            .par_iter()
+            .map(|object| object.carry(own[object.shape.index()]))
+            .reduce(|| Aabb::EMPTY, Aabb::union)
     }
 
     /// Refines a hit: recomputes everything about it in `f64` on the primitive it names.

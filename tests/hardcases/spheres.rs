@@ -367,7 +367,16 @@ pub fn s11(row: &mut Row) {
 
 pub fn s12(row: &mut Row) {
     use dualight::scene::SceneBuilder;
-    let bad = [0.0, 1e-40, -1.0, f32::NAN, f32::INFINITY, 1.9e18];
+    let bad = [
+        0.0,
+        1e-40,
+        1e-30,
+        1e-19,
+        -1.0,
+        f32::NAN,
+        f32::INFINITY,
+        1.9e18,
+    ];
     let mut m = Meter::default();
     let mut list: Vec<[f32; 4]> = bad.map(|r| [0.0, 0.0, 0.0, r]).to_vec();
     list.push([5.0, 0.0, 0.0, 1.0]);
@@ -395,7 +404,7 @@ pub fn s12(row: &mut Row) {
         scene
             .warnings
             .iter()
-            .any(|w| w.contains("bad ones") && w.contains('6')),
+            .any(|w| w.contains("bad ones") && w.contains('8')),
     );
     row.line("import", "not dropped, not counted or not named", m, 0.0);
     for (name, accel) in backends(&scene.geometry) {

@@ -4,6 +4,8 @@
 //! placed ones as instances of their shape's scene. Whichever it is, the id that Embree reports
 //! at the top is the [`ObjectId`].
 
+mod scaled;
+
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -28,11 +30,11 @@ struct Embree {
     primitives: u64,
 }
 
-impl Accelerator for Embree {
-    #[inline]
-    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+impl Embree {
+    /// The nearest hit of a ray that filters know by `key`.
+    #[inline(always)]
+    fn nearest(&self, ray: &Ray, key: impl FnOnce() -> u64) -> Option<Hit> {
         let (o, d) = (ray.o.into(), ray.d.into());
-        let key = || ray_key(ray);
         let h = self.scene.intersect(o, d, ray.tmin, ray.tmax, key)?;
         Some(Hit {
             t: h.t,
@@ -43,11 +45,23 @@ impl Accelerator for Embree {
         })
     }
 
+    /// Whether anything is in the way of a ray that filters know by `key`.
+    #[inline(always)]
+    fn any(&self, ray: &Ray, key: impl FnOnce() -> u64) -> bool {
+        let (o, d) = (ray.o.into(), ray.d.into());
+        self.scene.occluded(o, d, ray.tmin, ray.tmax, key)
+    }
+}
+
+impl Accelerator for Embree {
+    #[inline]
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.nearest(ray, || ray_key(ray))
+    }
+
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
-        let (o, d) = (ray.o.into(), ray.d.into());
-        let key = || ray_key(ray);
-        self.scene.occluded(o, d, ray.tmin, ray.tmax, key)
+        self.any(ray, || ray_key(ray))
     }
 
     fn stats(&self) -> BuildStats {
@@ -89,10 +103,12 @@ impl HitFilter for Filter {
     }
 }
 
+/// The shape of an object, `scale` times as large.
 fn shape_geometry(
     device: &Device,
     geometry: &Arc<Geometry>,
     object: &Object,
+    scale: f32,
 ) -> Result<EmbreeGeometry, EmbreeError> {
     let filter = object.coverage.as_ref().map(|coverage| {
         Box::new(Filter {
@@ -102,8 +118,13 @@ fn shape_geometry(
         }) as Box<dyn HitFilter>
     });
     match geometry.shape(object.shape) {
-        Shape::Mesh(m) => EmbreeGeometry::triangles(device, &m.positions, &m.indices, filter),
-        Shape::Spheres(s) => EmbreeGeometry::spheres(device, &s.spheres, filter),
+        Shape::Mesh(m) => {
+            let positions = scaled::scaled(&m.positions, scale);
+            EmbreeGeometry::triangles(device, &positions, &m.indices, filter)
+        }
+        Shape::Spheres(s) => {
+            EmbreeGeometry::spheres(device, &scaled::scaled(&s.spheres, scale), filter)
+        }
     }
 }
 
@@ -121,25 +142,28 @@ fn build_scene(
     geometry: &Arc<Geometry>,
     device: Device,
     empty: fn(&Device) -> Result<SceneBuilder, EmbreeError>,
+    scale: f32,
 ) -> Result<Embree, EmbreeError> {
     let start = Instant::now();
     let mut top = empty(&device)?;
     // One scene for each shape, and one more for each material through which it is not whole.
-    let mut shared: HashMap<(ShapeId, Option<MaterialId>), CommittedScene> = HashMap::new();
+    let mut shared: HashMap<(ShapeId, Option<MaterialId>), (CommittedScene, f32)> = HashMap::new();
     for (i, object) in geometry.objects.iter().enumerate() {
         let attached = match &object.placement {
-            None => shape_geometry(&device, geometry, object)?,
+            None => shape_geometry(&device, geometry, object, scale)?,
             Some(place) => {
                 let material = object.coverage.as_ref().map(|_| object.material);
-                let scene = match shared.entry((object.shape, material)) {
+                let (scene, own) = match shared.entry((object.shape, material)) {
                     Entry::Occupied(e) => e.into_mut(),
                     Entry::Vacant(e) => {
+                        let own = scaled::wanted(geometry.shape(object.shape).bounds());
                         let mut builder = empty(&device)?;
-                        builder.attach(&shape_geometry(&device, geometry, object)?, 0)?;
-                        e.insert(builder.commit()?)
+                        builder.attach(&shape_geometry(&device, geometry, object, own)?, 0)?;
+                        e.insert((builder.commit()?, own))
                     }
                 };
-                EmbreeGeometry::instance(&device, scene, columns(&place.world_from_object))?
+                let map = scaled::map(&place.world_from_object, scale, *own);
+                EmbreeGeometry::instance(&device, scene, columns(&map))?
             }
         };
         top.attach(&attached, i as u32)?;
@@ -157,16 +181,27 @@ fn device(threads: usize, more: &str) -> Result<Device, EmbreeError> {
     Device::new(&format!("threads={}{more}", threads.max(1)))
 }
 
-fn made(built: Result<Embree, EmbreeError>) -> Result<Box<dyn Accelerator>> {
-    Ok(Box::new(built.map_err(failure)?))
+/// Builds over a geometry that is in the middle of the range of single precision, or is put there.
+fn made(
+    geometry: &Arc<Geometry>,
+    device: Result<Device, EmbreeError>,
+    empty: fn(&Device) -> Result<SceneBuilder, EmbreeError>,
+) -> Result<Box<dyn Accelerator>> {
+    let scale = scaled::wanted(geometry.bounds());
+    let built = device.and_then(|d| build_scene(geometry, d, empty, scale));
+    let embree = built.map_err(failure)?;
+    Ok(match scale {
+        1.0 => Box::new(embree),
+        _ => Box::new(scaled::Scaled { embree, scale }),
+    })
 }
 
 fn build(geometry: &Arc<Geometry>, threads: usize) -> Result<Box<dyn Accelerator>> {
-    made(device(threads, "").and_then(|d| build_scene(geometry, d, SceneBuilder::new)))
+    made(geometry, device(threads, ""), SceneBuilder::new)
 }
 
 fn build_fast(geometry: &Arc<Geometry>, threads: usize) -> Result<Box<dyn Accelerator>> {
-    made(device(threads, "").and_then(|d| build_scene(geometry, d, SceneBuilder::fast)))
+    made(geometry, device(threads, ""), SceneBuilder::fast)
 }
 
 /// Embree held to one set of instructions (`sse2`, `sse42`, `avx`, `avx2`, `avx512`), on one
@@ -176,7 +211,7 @@ fn build_fast(geometry: &Arc<Geometry>, threads: usize) -> Result<Box<dyn Accele
 /// A set that the processor or the library does not have.
 pub fn with_instructions(set: &str, geometry: &Arc<Geometry>) -> Result<Box<dyn Accelerator>> {
     let device = device(1, &format!(",isa={set}"));
-    made(device.and_then(|d| build_scene(geometry, d, SceneBuilder::new)))
+    made(geometry, device, SceneBuilder::new)
 }
 
 /// The registry's line.
