@@ -383,3 +383,55 @@ fn a_mirror_sphere_scatters_parallel_light_evenly() {
         seen.assert_mean_with_bias(&what, PI / 4.0 / 6.0, 0.006, 1e-3);
     }
 }
+
+/// A ball of glass with this dispersion in front of squares of light.
+fn prism_ball(dispersion: f64) -> Scene {
+    scene(|b| {
+        let ball = MaterialDesc {
+            dispersion,
+            ..glass(1.5)
+        };
+        let ball = b.add_material(&ball).expect("glass");
+        let grey = b
+            .add_material(&lambert("grey", Rgb::splat(0.7)))
+            .expect("grey");
+        let white = b.add_material(&lamp(Rgb::ONE)).expect("lamp");
+        add_sphere(b, "ball", ball, DVec3::ZERO, 1.0);
+        for i in -2..=2 {
+            let p = DVec3::new(f64::from(i) - 0.25, -2.0, -3.0);
+            let m = if i % 2 == 0 { white } else { grey };
+            add_quad(b, "square", m, p, DVec3::X * 0.5, DVec3::Y * 4.0);
+        }
+        b.add_camera(common::camera(DVec3::Z * 4.0, 30.0));
+    })
+}
+
+/// Mean squared difference of the specular layers of two seeds, of their squared mean.
+fn specular_noise(dispersion: f64) -> f64 {
+    let scene = prism_ball(dispersion);
+    let size = Size {
+        pixels: 32,
+        spp: 4,
+        photons: 1000,
+    };
+    let of = |seed: u64| {
+        let image = render(&scene, DIRECT_MAP, size, 2 * seed);
+        image.rgb("specular").expect("a layer")
+    };
+    let (a, b) = (of(1), of(2));
+    let both = || a.iter().flatten().zip(b.iter().flatten());
+    let square: f64 = both().map(|(x, y)| f64::from(x - y).powi(2)).sum();
+    let mean: f64 = both().map(|(x, y)| f64::from(x + y).powi(2) / 4.0).sum();
+    square / mean
+}
+
+#[test]
+fn dispersion_costs_no_noise() {
+    let plain = specular_noise(0.0);
+    assert!(plain > 0.0);
+    // Where colours part, each sees edges of its own; where they hardly do, nothing may change.
+    let [little, much] = [1e-6, 1.0].map(|d| specular_noise(d) / plain);
+    println!("{plain:.2e}, times {little:.3} and {much:.3}");
+    assert!(little < 1.05, "{little}");
+    assert!(much < 2.0, "{much}");
+}
