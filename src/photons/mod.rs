@@ -16,6 +16,7 @@ mod adaptive;
 mod adaptive_linear;
 mod departure;
 mod emit;
+mod in_order;
 mod ledger;
 pub mod map;
 mod photon;

@@ -1,8 +1,7 @@
 //! Following photons through the scene.
 
-use rayon::prelude::*;
-
 use super::emit::{PhotonSource, Purpose};
+use super::in_order::in_order;
 use super::ledger::Ledger;
 use super::photon::{Photon, PhotonClass};
 use super::{EmittedPhoton, PhotonSettings};
@@ -66,33 +65,28 @@ pub fn follow_photons(
         effects,
         settings,
     };
-    let batches: Vec<Batch> = (0..n.div_ceil(BATCH))
-        .into_par_iter()
-        .map(|b| {
-            let mut batch = Batch::default();
-            let (lo, hi) = (b * BATCH, ((b + 1) * BATCH).min(n));
-            if control.stopped().is_none() {
-                for i in lo..hi {
-                    batch.ledger.photons += 1;
-                    if let Some(photon) = source.emit(i) {
-                        tracer.follow(&photon, i, &mut batch);
-                    }
+    let (mut ledger, mut rays) = (Ledger::default(), RayCounts::default());
+    let (mut photons, mut glow) = (Vec::new(), Vec::new());
+    let follow = |b: u64| {
+        let mut batch = Batch::default();
+        let (lo, hi) = (b * BATCH, ((b + 1) * BATCH).min(n));
+        if control.stopped().is_none() {
+            for i in lo..hi {
+                batch.ledger.photons += 1;
+                if let Some(photon) = source.emit(i) {
+                    tracer.follow(&photon, i, &mut batch);
                 }
             }
-            stage.advance(hi - lo);
-            batch
-        })
-        .collect();
-    let mut ledger = Ledger::default();
-    let mut rays = RayCounts::default();
-    let mut photons = Vec::with_capacity(batches.iter().map(|b| b.photons.len()).sum());
-    let mut glow = Vec::with_capacity(batches.iter().map(|b| b.glow.len()).sum());
-    for b in batches {
+        }
+        stage.advance(hi - lo);
+        batch
+    };
+    in_order(n.div_ceil(BATCH), follow, |b| {
+        photons.extend_from_slice(&b.photons);
         glow.extend_from_slice(&b.glow);
         ledger.add(&b.ledger);
         rays.photon += b.segments;
-        photons.extend_from_slice(&b.photons);
-    }
+    });
     rays.check = source.checks();
     let counts = PhotonCounts {
         checked: source.checks(),
