@@ -1,18 +1,20 @@
 //! From a scene to an image: one call per stage, each with its time.
 
+mod foreseen;
 mod progressive;
 
 pub use progressive::{Progressive, Session, Standing};
 
 use std::time::Instant;
 
+use foreseen::{plan_layer, smooth};
 use progressive::Forecast;
 
 use crate::cameras::{framing, with_lens};
 use crate::control::{Control, Stopped};
 use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
-use crate::film::{Channel, Component, Film, Layer};
+use crate::film::{Component, Film};
 use crate::integrators::{
     IntegratorSettings, PhotonNeeds, PixelPlan, Region, RenderContext, Spacing, Visibility,
     camera_pass, guarded, planned_camera_pass,
@@ -62,6 +64,8 @@ pub struct RenderSettings {
     pub spp: u32,
     /// How samples are shared among pixels.
     pub pixel_sampling: PixelSampling,
+    /// Whether adaptive sampling also interpolates indirect light where no edge is.
+    pub interpolation: bool,
     /// Whether to render in independent passes, whose spread tells the error, and when to end.
     pub progressive: Option<Progressive>,
     /// Part of the image to render: left, top, right, bottom in pixels; the rest stays black.
@@ -85,6 +89,7 @@ impl Default for RenderSettings {
             height: 512,
             spp: 16,
             pixel_sampling: PixelSampling::Uniform,
+            interpolation: true,
             progressive: None,
             crop: None,
             camera: None,
@@ -333,7 +338,12 @@ fn render_in_pool(
     }
 
     if let Some(plan) = &plan {
-        film.attach(plan_layer(plan, &film));
+        let edges = plan.edges(&film);
+        if settings.interpolation && smooth(effects.set) {
+            film.interpolate(&edges);
+            clock.lap("interpolation");
+        }
+        film.attach(plan_layer(&edges, &film));
     }
     let built = accel.stats();
     Ok(Rendering {
@@ -354,25 +364,6 @@ fn render_in_pool(
         stopped: control.stopped(),
         effects: effects.decisions,
     })
-}
-
-/// What a plan foresaw of each pixel, and what came of it.
-fn plan_layer(plan: &PixelPlan, film: &Film) -> Layer {
-    let channel = |name: &str, data| Channel {
-        name: name.into(),
-        half: false,
-        data,
-    };
-    Layer {
-        name: "pixels".into(),
-        channels: vec![
-            channel("edges", plan.edges(film)),
-            channel(
-                "samples",
-                film.samples().iter().map(|n| *n as f32).collect(),
-            ),
-        ],
-    }
 }
 
 /// The components of the image that the effects leave.

@@ -182,6 +182,10 @@ pub struct RenderArgs {
     /// differ. Adaptive is for a known --spp, not for images in passes
     #[arg(long, value_enum, default_value = "uniform", help_heading = "Image")]
     pub pixel_sampling: PixelSampling,
+    /// Whether adaptive sampling interpolates indirect light in pixels without an edge
+    #[arg(long, value_name = "on|off", default_value = "on", value_parser = values::on_off)]
+    #[arg(help_heading = "Image", action = clap::ArgAction::Set)]
+    pub interpolation: bool,
     /// Camera to look through; auto frames the whole scene [default: the first of the scene]
     #[arg(long, value_name = "NAME", help_heading = "Image")]
     pub camera: Option<String>,

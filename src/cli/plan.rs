@@ -120,6 +120,7 @@ impl Plan {
                     None => args.quality.spp(),
                 }),
                 pixel_sampling: args.pixel_sampling,
+                interpolation: args.interpolation,
                 progressive: progressive(args),
                 crop: args.crop.map(|c| c.0),
                 camera: args.camera.clone(),

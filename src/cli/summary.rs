@@ -34,7 +34,14 @@ pub(super) fn table(s: &Summary) -> String {
             r.height,
             match r.pixel_sampling {
                 PixelSampling::Uniform => format!("{} samples each", s.metadata.spp),
-                PixelSampling::Adaptive => format!("{} samples in the mean", r.spp),
+                PixelSampling::Adaptive => format!(
+                    "{} samples in the mean{}",
+                    r.spp,
+                    match s.rendering.film.reach() {
+                        Some(_) => ", indirect light interpolated",
+                        None => "",
+                    }
+                ),
             },
             r.integrator.as_deref().unwrap_or_default(),
             s.integrator_reason
@@ -154,6 +161,7 @@ pub(super) fn json(s: &Summary) -> String {
             "accelerator": r.accelerator,
             "emission": r.emission,
             "pixel_sampling": r.pixel_sampling.name(),
+            "interpolation": r.interpolation,
             "effects": r.effects,
             "width": r.width,
             "height": r.height,

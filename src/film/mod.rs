@@ -1,5 +1,6 @@
 //! The film: what pixels have gathered, as named layers. Knows radiance, nothing of scenes.
 
+mod interpolation;
 mod layer;
 mod passes;
 mod state;
@@ -134,6 +135,9 @@ pub struct Film {
     kept: [bool; 4],
     passes: Option<passes::Passes>,
     attached: Vec<Layer>,
+    /// Indirect radiance of one half of each pixel's samples, summed, and how many they are.
+    half: Vec<([f32; 3], u32)>,
+    interpolated: Option<interpolation::Interpolated>,
 }
 
 impl Film {
@@ -150,7 +154,50 @@ impl Film {
             kept: [true; 4],
             passes: None,
             attached: Vec::new(),
+            half: Vec::new(),
+            interpolated: None,
         }
+    }
+
+    /// Tells of the samples of a pixel that are added what one half of them brought: their number
+    /// and the sum of their indirect radiance.
+    pub fn add_half(&mut self, [x, y]: [u32; 2], indirect: Rgb, samples: u32) {
+        self.half.resize(self.counts.len(), Default::default());
+        let kept = self.kept[Component::Indirect as usize];
+        let values = indirect.to_f32();
+        if kept && values.iter().all(|v| v.is_finite()) {
+            let (sum, n) = &mut self.half[y as usize * self.width as usize + x as usize];
+            for (a, v) in sum.iter_mut().zip(values) {
+                *a += v;
+            }
+            *n += samples;
+        }
+    }
+
+    /// Indirect radiance of both halves of the samples of each pixel, summed, and how many they
+    /// are.
+    fn halves(&self) -> impl Iterator<Item = [([f32; 3], u32); 2]> {
+        let at = 3 * Component::Indirect as usize;
+        let own = self.sums.iter().zip(&self.counts).enumerate();
+        own.map(move |(i, (sums, all))| {
+            let (half, n) = self.half.get(i).copied().unwrap_or_default();
+            let rest = [0, 1, 2].map(|c| sums[at + c] - half[c]);
+            [(half, n), (rest, all.saturating_sub(n))]
+        })
+    }
+
+    /// Interpolates the indirect light of what was added so far, in all pixels without an edge (one
+    /// flag a pixel, row by row) that have [halves](Self::add_half). Images developed from now on
+    /// show it.
+    pub fn interpolate(&mut self, edges: &[bool]) {
+        self.interpolated = None;
+        self.interpolated = Some(interpolation::interpolate(self, edges));
+    }
+
+    /// How far around each pixel its indirect light was interpolated from, in pixels; 0 where it
+    /// is the pixel's own. `None` if it was not interpolated.
+    pub fn reach(&self) -> Option<&[f32]> {
+        self.interpolated.as_ref().map(|i| i.reach.as_slice())
     }
 
     /// Develops with another layer, row by row as wide and high as the film, beside its own.
@@ -299,6 +346,18 @@ impl Film {
         let mut layers = vec![beauty];
         for (k, component) in Component::ALL.into_iter().enumerate() {
             layers.push(rgb(component.name(), &|s, c| s[3 * k + c]));
+        }
+        if let Some(i) = &self.interpolated {
+            let indirect = 1 + Component::Indirect as usize;
+            let own = i.radiance.iter().enumerate();
+            for (pixel, radiance) in own.filter_map(|(k, r)| Some((k, (*r)?))) {
+                for (c, new) in radiance.into_iter().enumerate() {
+                    layers[indirect].channels[c].data[pixel] = new;
+                    let parts = layers[1..=indirect].iter();
+                    let sum = parts.map(|l| l.channels[c].data[pixel]).sum();
+                    layers[0].channels[c].data[pixel] = sum;
+                }
+            }
         }
         layers.push(rgb("albedo", &|s, c| s[12 + c]));
         let xyz = |name: &str, at: usize| Layer {

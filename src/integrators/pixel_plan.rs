@@ -16,8 +16,9 @@ use super::camera_pass::View;
 use super::pixel_edges::Finder;
 use super::{BATCH, Integrator, RenderContext, Sample, Scratch, Spacing};
 use crate::cameras::Camera;
+use crate::color::Rgb;
 use crate::control::Control;
-use crate::film::{Film, PixelSample, Tile};
+use crate::film::{Component, Film, PixelSample, Tile};
 use crate::sampling::{hash2, stream};
 use crate::stats::RayCounts;
 use arrayvec::ArrayVec;
@@ -127,14 +128,14 @@ impl PixelPlan {
         take(view, integrator, self.region, &counts, film, rays, control);
     }
 
-    /// Whether each pixel of the image was forecast to hold an edge: 1 or 0.
-    pub fn edges(&self, film: &Film) -> Vec<f32> {
-        let mut out = vec![0.0; film.samples().len()];
+    /// Whether each pixel of the image was forecast to hold an edge, row by row.
+    pub fn edges(&self, film: &Film) -> Vec<bool> {
+        let mut out = vec![false; film.samples().len()];
         let width = (self.region.x1 - self.region.x0) as usize;
         for (i, _) in self.edges.iter().enumerate().filter(|(_, e)| **e) {
             let (x, y) = (i % width, i / width);
             let row = (self.region.y0 as usize + y) * film.width() as usize;
-            out[row + self.region.x0 as usize + x] = 1.0;
+            out[row + self.region.x0 as usize + x] = true;
         }
         out
     }
@@ -227,8 +228,13 @@ fn take(
                 stage.advance(u64::from(n));
                 let spread = Spread::of(&sums);
                 let mut sum = PixelSample::default();
-                for s in &sums {
+                let mut half = (Rgb::ZERO, 0);
+                for (s, number) in sums.iter().zip(first..) {
                     sum.merge(s);
+                    if number % 2 == 0 {
+                        half.0 += s.radiance[Component::Indirect as usize];
+                        half.1 += 1;
+                    }
                 }
                 let tile = Tile {
                     x: px,
@@ -238,12 +244,13 @@ fn take(
                     sums: vec![sum],
                     samples: n,
                 };
-                Some((i, spread, tile, scratch.rays))
+                Some((i, spread, tile, half, scratch.rays))
             })
             .collect();
-        for (i, spread, tile, traced) in taken.into_iter().flatten() {
+        for (i, spread, tile, (indirect, samples), traced) in taken.into_iter().flatten() {
             out[i] = spread;
             rays.add(&traced);
+            film.add_half([tile.x, tile.y], indirect, samples);
             film.add(&tile);
         }
     }

@@ -1,0 +1,318 @@
+//! Indirect light interpolated where nothing changes: in pixels without an edge it comes from all
+//! pixels around that see the same surface, not from their own samples alone.
+//!
+//! What is interpolated is irradiance (indirect light over albedo), which is smooth where the
+//! picture is not. A plane fitted to the pixels around gives its value and its derivative; how far
+//! around is decided by what that derivative cannot follow. Windows grow as long as the
+//! confidence intervals of what they say have a point in common: once the bend of the irradiance
+//! outweighs the noise, they have none (Goldenshluger and Nemirovski 1997; Katkovnik 1999). So
+//! the error of interpolation stays below that of the noise which it takes away, and both vanish
+//! as samples are added.
+//!
+//! Noise is rare bright samples. Windows that looked at the samples they average would stop before
+//! such a one, and its light would be lost: 1 % of all in the box by paths. So each half of the
+//! samples is averaged over windows that the other half has chosen.
+//!
+//! Local planes in rendering: Moon, Carr and Yoon, *Adaptive Rendering Based on Weighted Local
+//! Regression*, ACM TOG 33(5), 2014.
+
+mod fit;
+
+use arrayvec::ArrayVec;
+use rayon::prelude::*;
+
+use self::fit::{Moments, Normal};
+use super::Film;
+
+/// Half widths of the windows, in pixels.
+const REACHES: [i32; 7] = [0, 1, 2, 3, 5, 8, 12];
+
+/// Half width of the window in which noise is averaged.
+const NOISE: i32 = 8;
+
+/// Fewest pixels that tell it.
+const FEWEST: u32 = 10;
+
+/// What tells noise from light: it is blind to planes, to all that bends along one axis only, and
+/// to straight steps along the other (Immerkær, *Fast Noise Variance Estimation*, 1996).
+const LAPLACE: [[f64; 3]; 3] = [[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]];
+
+/// Half width of the intervals, in standard deviations. Of 1.5, 2 and 3 the first left least
+/// error in the box, by a tenth; wider ones blur more.
+const INTERVAL: f64 = 1.5;
+
+/// Least cosine between the normals of pixels that see one surface.
+const AGREEMENT: f32 = 0.9;
+
+/// Least albedo that light can be divided by.
+const DARKEST: f32 = 1e-3;
+
+/// What became of the indirect light of a film.
+#[derive(Clone, Debug)]
+pub(super) struct Interpolated {
+    /// Indirect radiance of each pixel that was interpolated.
+    pub(super) radiance: Vec<Option<[f32; 3]>>,
+    /// Half width of the window, in pixels; 0 where it was not.
+    pub(super) reach: Vec<f32>,
+}
+
+/// One pixel, by half of its samples.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pixel {
+    /// Its surface, among those that edges divide; 0 for none.
+    surface: u32,
+    /// Samples; 0 if nothing can be learnt from it.
+    samples: f32,
+    albedo: [f32; 3],
+    /// Indirect light over albedo, and the mean of its channels.
+    light: [f32; 3],
+    mean: f32,
+    normal: [f32; 3],
+}
+
+impl Pixel {
+    fn sees_as(&self, o: &Self) -> bool {
+        let cos: f32 = self.normal.iter().zip(o.normal).map(|(a, b)| a * b).sum();
+        o.samples > 0.0 && self.surface == o.surface && cos >= AGREEMENT
+    }
+}
+
+struct View {
+    width: i32,
+    height: i32,
+    pixels: Vec<Pixel>,
+    /// Variance of a sample as told by each pixel and the eight around it.
+    noise: Vec<Option<f32>>,
+}
+
+impl View {
+    /// By the samples of each half of the film.
+    fn halves(film: &Film, edges: &[bool]) -> [Self; 2] {
+        let image = film.develop();
+        let width = film.width() as usize;
+        let albedo = image.rgb("albedo").unwrap_or_default();
+        let normal = |i: usize| {
+            ["X", "Y", "Z"].map(|c| image.channel("N", c).map_or(0.0, |channel| channel[i]))
+        };
+        let surfaces = surfaces(width, edges);
+        [0, 1].map(|half| {
+            let pixel = |(i, sums): (usize, [([f32; 3], u32); 2])| {
+                let ((sum, n), a) = (sums[half], albedo[i]);
+                let least = a.iter().copied().fold(f32::INFINITY, f32::min);
+                let known = surfaces[i] > 0 && least >= DARKEST && sums.iter().all(|s| s.1 > 0);
+                let light = [0, 1, 2].map(|c| match known {
+                    true => sum[c] / (n as f32 * a[c]),
+                    false => 0.0,
+                });
+                Pixel {
+                    surface: surfaces[i],
+                    samples: if known { n as f32 } else { 0.0 },
+                    albedo: a,
+                    light,
+                    mean: light.iter().sum::<f32>() / 3.0,
+                    normal: normal(i),
+                }
+            };
+            let mut view = Self {
+                width: width as i32,
+                height: film.height() as i32,
+                pixels: film.halves().enumerate().map(pixel).collect(),
+                noise: Vec::new(),
+            };
+            let all = (0..view.pixels.len()).into_par_iter();
+            view.noise = all.map(|i| view.roughness(i)).collect();
+            view
+        })
+    }
+
+    fn roughness(&self, i: usize) -> Option<f32> {
+        let (mut n, mut sum, mut variance) = (0, 0.0, 0.0);
+        self.around(i, -1, 1, |_, o, x, y| {
+            let c = LAPLACE[(y + 1.0) as usize][(x + 1.0) as usize];
+            n += 1;
+            sum += c * f64::from(o.mean);
+            variance += c * c / f64::from(o.samples);
+        });
+        (n == 9 && self.pixels[i].samples > 0.0).then(|| (sum * sum / variance) as f32)
+    }
+
+    /// Variance of a sample around a pixel; `None` if too few pixels tell.
+    fn noise(&self, i: usize) -> Option<f64> {
+        let (mut n, mut sum) = (0, 0.0);
+        self.around(i, -1, NOISE, |k, _, _, _| {
+            if let Some(v) = self.noise[k] {
+                n += 1;
+                sum += f64::from(v);
+            }
+        });
+        (n >= FEWEST).then(|| sum / f64::from(n))
+    }
+
+    /// Calls `f` with the pixels that see what pixel `i` sees, farther than `inner` and up to
+    /// `outer` away: number, pixel, and where it lies from there.
+    #[inline]
+    fn around(&self, i: usize, inner: i32, outer: i32, mut f: impl FnMut(usize, &Pixel, f64, f64)) {
+        let (x, y) = (i as i32 % self.width, i as i32 / self.width);
+        let own = &self.pixels[i];
+        for dy in (-outer).max(-y)..=outer.min(self.height - 1 - y) {
+            let row = (y + dy) * self.width + x;
+            for dx in (-outer).max(-x)..=outer.min(self.width - 1 - x) {
+                if dx.abs().max(dy.abs()) <= inner {
+                    continue;
+                }
+                let k = (row + dx) as usize;
+                if own.sees_as(&self.pixels[k]) {
+                    f(k, &self.pixels[k], f64::from(dx), f64::from(dy));
+                }
+            }
+        }
+    }
+
+    /// How far the window of a pixel may reach: an index of [`REACHES`].
+    fn reach(&self, i: usize) -> usize {
+        if self.pixels[i].samples == 0.0 {
+            return 0;
+        }
+        let Some(noise) = self.noise(i) else {
+            return 0;
+        };
+        let (mut matrix, mut moments) = (Normal::default(), Moments::default());
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut inner = -1;
+        for (k, reach) in REACHES.into_iter().enumerate() {
+            self.around(i, inner, reach, |_, o, x, y| {
+                let w = f64::from(o.samples);
+                matrix.add(w, x, y);
+                moments.add(w, x, y, f64::from(o.mean));
+            });
+            inner = reach;
+            let Some(inverse) = matrix.inverse() else {
+                return k.saturating_sub(1);
+            };
+            let value = moments.dot(inverse[0]);
+            let half = INTERVAL * (noise * inverse[0][0]).sqrt();
+            (low, high) = (low.max(value - half), high.min(value + half));
+            if !(low <= high) {
+                return k.saturating_sub(1);
+            }
+        }
+        REACHES.len() - 1
+    }
+
+    /// The median of what is known of the pixels about `i`: the luck of one must not show as a speck.
+    fn median(&self, known: &[usize], i: usize) -> usize {
+        let mut near = ArrayVec::<usize, 9>::new();
+        self.around(i, -1, 1, |k, _, _, _| near.push(known[k]));
+        near.sort_unstable();
+        near.get(near.len() / 2).copied().unwrap_or(0)
+    }
+
+    /// The light of a pixel by a window; `None` if nothing is to be learnt from it.
+    fn fit(&self, i: usize, reach: i32) -> Option<[f32; 3]> {
+        if self.pixels[i].samples == 0.0 {
+            return None;
+        }
+        let (mut matrix, mut moments) = (Normal::default(), [Moments::default(); 3]);
+        self.around(i, -1, reach, |_, o, x, y| {
+            let w = f64::from(o.samples);
+            matrix.add(w, x, y);
+            for (m, v) in moments.iter_mut().zip(o.light) {
+                m.add(w, x, y, f64::from(v));
+            }
+        });
+        let inverse = matrix.inverse()?;
+        Some(moments.map(|m| m.dot(inverse[0]) as f32))
+    }
+}
+
+/// Numbers of the surfaces that edges divide, from 1; 0 for pixels with an edge.
+fn surfaces(width: usize, edges: &[bool]) -> Vec<u32> {
+    let mut out = vec![0; edges.len()];
+    let mut next = 0;
+    let mut open = Vec::new();
+    for start in 0..edges.len() {
+        if edges[start] || out[start] > 0 {
+            continue;
+        }
+        next += 1;
+        out[start] = next;
+        open.push(start);
+        while let Some(i) = open.pop() {
+            let x = i % width;
+            let beside = [
+                (x > 0).then(|| i - 1),
+                (x + 1 < width).then_some(i + 1),
+                i.checked_sub(width),
+                (i + width < edges.len()).then_some(i + width),
+            ];
+            for k in beside.into_iter().flatten() {
+                if !edges[k] && out[k] == 0 {
+                    out[k] = next;
+                    open.push(k);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Interpolates the indirect light of a film in all pixels without an edge.
+pub(super) fn interpolate(film: &Film, edges: &[bool]) -> Interpolated {
+    let views = View::halves(film, edges);
+    let all = || (0..edges.len()).into_par_iter();
+    let reaches: [Vec<usize>; 2] = [0, 1].map(|k| all().map(|i| views[k].reach(i)).collect());
+    let (radiance, reach) = all()
+        .map(|i| {
+            let [a, b] = [0, 1].map(|k| {
+                let reach = REACHES[views[k].median(&reaches[1 - k], i)];
+                (views[k].fit(i, reach), reach)
+            });
+            let (Some(one), Some(other)) = (a.0, b.0) else {
+                return (None, 0.0);
+            };
+            if a.1 + b.1 == 0 {
+                return (None, 0.0);
+            }
+            let [p, q] = [&views[0].pixels[i], &views[1].pixels[i]];
+            let share = p.samples / (p.samples + q.samples);
+            let light = |c: usize| share * one[c] + (1.0 - share) * other[c];
+            let radiance = [0, 1, 2].map(|c| light(c).max(0.0) * p.albedo[c]);
+            (Some(radiance), 0.5 * (a.1 + b.1) as f32)
+        })
+        .unzip();
+    let mut out = Interpolated { radiance, reach };
+    keep_flux(&mut out, &views);
+    out
+}
+
+/// What windows cut off the peaks of the irradiance is less than its noise, but it is always cut
+/// off: each surface gets back what it had in all.
+fn keep_flux(out: &mut Interpolated, views: &[View; 2]) {
+    let surface = |i: usize| views[0].pixels[i].surface as usize;
+    let most = views[0].pixels.iter().map(|p| p.surface).max();
+    let mut sums = vec![[[0.0_f64; 2]; 3]; most.map_or(0, |n| n as usize + 1)];
+    let known = |out: &Interpolated| -> Vec<(usize, [f32; 3])> {
+        let all = out.radiance.iter().enumerate();
+        all.filter_map(|(i, r)| Some((i, (*r)?))).collect()
+    };
+    let known = known(out);
+    for (i, radiance) in &known {
+        let [p, q] = [&views[0].pixels[*i], &views[1].pixels[*i]];
+        let share = p.samples / (p.samples + q.samples);
+        for c in 0..3 {
+            let own = (share * p.light[c] + (1.0 - share) * q.light[c]) * p.albedo[c];
+            let sum = &mut sums[surface(*i)][c];
+            *sum = [sum[0] + f64::from(own), sum[1] + f64::from(radiance[c])];
+        }
+    }
+    for (i, radiance) in known {
+        let factor = |c: usize| match sums[surface(i)][c] {
+            [own, new] if new > 0.0 => (own / new) as f32,
+            _ => 1.0,
+        };
+        out.radiance[i] = Some([0, 1, 2].map(|c| radiance[c] * factor(c)));
+    }
+}
+
+#[cfg(test)]
+mod tests;
