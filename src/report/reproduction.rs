@@ -9,7 +9,7 @@ use crate::control::Control;
 use crate::error::Result;
 use crate::film::Image;
 use crate::photons::PhotonSettings;
-use crate::pipeline::{self, RenderSettings};
+use crate::pipeline::{self, PixelSampling, RenderSettings};
 use crate::plugins::Registry;
 use crate::sampling::hash2;
 use crate::scene::Scene;
@@ -24,18 +24,22 @@ pub struct Contestant {
     pub name: &'static str,
     /// The emission's name.
     pub emission: &'static str,
+    /// How samples are shared among pixels: the paper's second step, or evenly.
+    pub pixels: PixelSampling,
     /// Photons of the global and of the caustic map.
     pub photons: [u64; 2],
     /// The paper's figures, if it has this one: stored in either map, and seconds in all.
     pub paper: Option<([u64; 2], f64)>,
 }
 
-/// The paper's two, and between them what tells the effect of the number from that of the places.
-pub const CONTESTANTS: [Contestant; 3] = [
+/// The paper's two, and between them what tells the effect of the number from that of the places,
+/// and that of photons from that of pixels.
+pub const CONTESTANTS: [Contestant; 4] = [
     Contestant {
         title: "conventional",
         name: "conventional",
         emission: "uniform",
+        pixels: PixelSampling::Uniform,
         photons: [100_000, 5_000],
         paper: Some(([368_558, 7_177], 2485.040)),
     },
@@ -43,6 +47,15 @@ pub const CONTESTANTS: [Contestant; 3] = [
         title: "conventional, half",
         name: "half",
         emission: "uniform",
+        pixels: PixelSampling::Uniform,
+        photons: [50_000, 2_500],
+        paper: None,
+    },
+    Contestant {
+        title: "adaptive photons",
+        name: "adaptive-photons",
+        emission: "adaptive",
+        pixels: PixelSampling::Uniform,
         photons: [50_000, 2_500],
         paper: None,
     },
@@ -50,6 +63,7 @@ pub const CONTESTANTS: [Contestant; 3] = [
         title: "adaptive",
         name: "adaptive",
         emission: "adaptive",
+        pixels: PixelSampling::Adaptive,
         photons: [50_000, 2_500],
         paper: Some(([196_367, 3_852], 630.690)),
     },
@@ -80,6 +94,7 @@ impl Contestant {
     pub fn settings(&self, base: &RenderSettings) -> RenderSettings {
         let mut out = base.clone();
         out.emission = Some(self.emission.into());
+        out.pixel_sampling = self.pixels;
         out.integrator_settings.photons = self.photons[0];
         out.integrator_settings.caustic_photons = self.photons[1];
         out

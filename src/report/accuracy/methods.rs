@@ -3,7 +3,7 @@
 
 use crate::integrators::{IntegratorSettings, PhotonNeeds};
 use crate::photons::SAMPLES_PER_PASS;
-use crate::pipeline::RenderSettings;
+use crate::pipeline::{PixelSampling, RenderSettings};
 use crate::plugins::Registry;
 
 /// Each rung of a ladder costs about so many times the one below.
@@ -87,6 +87,27 @@ const METHODS: &[Line] = &[
         Some("adaptive"),
         photon_ladder,
     ),
+    (
+        "photon+pixels",
+        "photon mapping, more samples at edges, indirect light interpolated elsewhere",
+        "photon",
+        Some("uniform"),
+        |s, rung| at_pixels(s, rung, photon_ladder),
+    ),
+    (
+        "photon+adaptive+pixels",
+        "both: the paper's whole method",
+        "photon",
+        Some("adaptive"),
+        |s, rung| at_pixels(s, rung, photon_ladder),
+    ),
+    (
+        "path+pixels",
+        "path tracing, more samples at edges, indirect light interpolated elsewhere",
+        "path",
+        None,
+        |s, rung| at_pixels(s, rung, path_ladder),
+    ),
 ];
 
 /// All methods: those above, and integrators that none of them uses, by their own names.
@@ -117,6 +138,12 @@ pub fn methods(registry: &Registry) -> Vec<Method> {
             emission: None,
         });
     known.chain(others).collect()
+}
+
+/// A ladder with samples shared out among pixels.
+fn at_pixels(s: &mut RenderSettings, rung: u32, ladder: fn(&mut RenderSettings, u32)) {
+    ladder(s, rung);
+    s.pixel_sampling = PixelSampling::Adaptive;
 }
 
 fn path_ladder(s: &mut RenderSettings, rung: u32) {
