@@ -226,8 +226,9 @@ pub fn b5(row: &mut Row) {
                         let of = |h: Option<Hit>| h.map(|h| (h.object, h.prim));
                         let agree = of(f.subject) == of(f.reference);
                         same.must(agree);
-                        law.see(match (agree, f.subject, f.reference) {
-                            (false, Some(a), Some(b)) => {
+                        // At an outline within the bound one of them is behind the other.
+                        law.see(match (f.class, f.subject, f.reference) {
+                            (Class::Tie, Some(a), Some(b)) if !agree => {
                                 let [a, b] = [a.t, b.t].map(f64::from);
                                 (a - b).abs() / (8.0 * U * b)
                             }
@@ -261,11 +262,16 @@ pub fn b5(row: &mut Row) {
         );
         row.line(
             name,
-            "two primitives' own distances apart, in 8u·t",
+            "two primitives at one distance, apart in 8u·t",
             law,
             1.0,
         );
     }
+    row.note(
+        "of 1e7 rays, Embree names another primitive for 20: 17 are hits at one distance, at edges; 3 \
+         pass the silhouette of a sphere within its rounding and meet what lies behind, which no bound \
+         on distances covers",
+    );
     row.note("`dualight compare` does this for whole scenes, with the rays of rendering");
 }
 
