@@ -1,5 +1,7 @@
 //! What the rest of the crate relies on, asked of the real library.
 
+mod filter;
+
 use std::ptr;
 use std::thread;
 

@@ -281,6 +281,7 @@ fn alike(row: &mut Row) {
         whole.see(f64::abs(total));
     }
     let path = "photons";
+    row.tried("32² patches, 64 seeds, five lights, two balls, both purposes");
     row.line(path, "worst patch of each, in standard errors", patch, 4.8);
     row.line(path, "pooled χ², in deviations", pooled, 3.1);
     row.line(
@@ -431,7 +432,9 @@ fn flat_and_smooth(row: &mut Row) {
     });
     let mut refined = Meter::default();
     refined.see(cells(&flat, Purpose::Global, 100_000) as f64 - 64.0);
+    row.tried("100² squares around a spot, 1e5 photons");
     row.line("photons", "cells refined on a flat grid", refined, 0.0);
+    row.tried("a ball of 39600 triangles and a sphere under a spot");
     // A ball of triangles is refined as the ball itself is: at its outline.
     let outline = |mesh: bool| {
         scene(|b| {
@@ -587,6 +590,7 @@ fn occluder(row: &mut Row) {
     let edge = (r / 1.5f64).asin();
     let near = angles.iter().filter(|a| (*a - edge).abs() < 0.01).count();
     m.must(angles.len() > 1000);
+    row.tried("a ball of 0.05 before one of 1, the spot wider than either, 4e4 photons");
     row.line(
         "photons",
         "refined without an edge, or not refined at one",

@@ -326,6 +326,61 @@ fn ellipsoids_are_hit_where_they_are() {
     }
 }
 
+/// Nodes that mirror within nodes that mirror: the front stays the front, however often the
+/// winding is turned (glTF 2.0, 3.7.4), for what is placed once and for what is shared.
+#[test]
+fn mirrors_within_mirrors_keep_the_front() {
+    use dualight::accel::ACCELERATORS;
+    use dualight::geometry::Ray;
+    use dualight::math::{DAffine3, DQuat, DVec3};
+    let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+    let mirrors = [[-1.0, 1.0, 1.0], [1.0, -2.0, 1.0], [-1.0, -1.0, -1.0]];
+    for depth in 1..=3 {
+        for copies in [1, 2] {
+            let mut a = Asset::triangle();
+            // The innermost node comes first and has the mesh; a copy lies farther out.
+            let mut nodes: Vec<_> = (0..depth)
+                .map(|k| {
+                    json!({"scale": mirrors[k], "rotation": turn.to_array(),
+                           "translation": [0.25, 0.5, -1.0]})
+                })
+                .collect();
+            nodes[0]["mesh"] = json!(0);
+            for (k, node) in nodes.iter_mut().enumerate().skip(1) {
+                node["children"] = json!([k - 1]);
+            }
+            if copies == 2 {
+                nodes.push(json!({"mesh": 0, "translation": [0.0, 0.0, 50.0]}));
+                a.json["scenes"][0]["nodes"] = json!([depth - 1, depth]);
+            } else {
+                a.json["scenes"][0]["nodes"] = json!([depth - 1]);
+            }
+            a.json["nodes"] = json!(nodes);
+            let scene = a.read().unwrap();
+            let world = (0..depth).rev().fold(DAffine3::IDENTITY, |m, k| {
+                m * DAffine3::from_scale_rotation_translation(
+                    mirrors[k].into(),
+                    turn,
+                    DVec3::new(0.25, 0.5, -1.0),
+                )
+            });
+            let at = |p: DVec3| world.transform_point3(p) - scene.center;
+            let normal = (world.matrix3.inverse().transpose() * DVec3::Z).normalize();
+            for entry in ACCELERATORS {
+                let accel = (entry.build)(&scene.geometry, 1).unwrap();
+                for side in [1.0, -1.0] {
+                    let (from, to) = (DVec3::new(0.3, 0.2, side), DVec3::new(0.2, 0.3, 0.0));
+                    let ray = Ray::new(at(from), at(to) - at(from));
+                    let hit = accel.intersect(&ray).unwrap();
+                    let sp = scene.surface_point(&ray, &hit);
+                    assert_eq!(sp.front, side > 0.0, "{}, {depth} deep", entry.name);
+                    assert!((sp.ng - normal).length() < 1e-6, "{} {normal}", sp.ng);
+                }
+            }
+        }
+    }
+}
+
 /// A shape that is placed often is in memory once, however it is hidden or squashed; and what is
 /// placed once moves to the world without a copy.
 #[test]

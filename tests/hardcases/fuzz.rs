@@ -10,7 +10,9 @@ use std::sync::Arc;
 
 use crate::exact::{ExactSphere, ExactTriangle};
 use crate::report::{Meter, Row};
-use crate::scenes::{backends, in_cube, mesh, on_sphere, refined, spheres, triangle};
+use crate::scenes::{
+    backends, exact, in_cube, mesh, on_sphere, ray_to, refined, spheres, triangle,
+};
 
 /// Rays for each primitive: building a backend takes longer than a ray.
 const RAYS: u64 = 200;
@@ -45,10 +47,10 @@ fn fuzz(
         .into_iter()
         .map(|b| b.0)
         .collect();
-    let found: Vec<[Meter; 6]> = (0..scenes)
+    let found: Vec<Vec<[Meter; 3]>> = (0..scenes)
         .into_par_iter()
         .map(|scene| {
-            let mut m = [Meter::default(); 6];
+            let mut m = vec![[Meter::default(); 3]; names.len()];
             let mut rng = Rng::new(seed ^ scene.wrapping_mul(0x9e37_79b9_7f4a_7c15));
             let Some((g, center, size)) = make(&mut rng) else {
                 return m;
@@ -67,18 +69,15 @@ fn fuzz(
                     }
                     Shape::Spheres(_) => center + in_cube(&mut rng) * size,
                 };
-                let mut ray = Ray::new(o, DVec3::X);
-                ray.d = (to - ray.origin()).as_vec3();
+                let ray = ray_to(o, to);
                 if !ray.is_valid() {
                     continue;
                 }
                 let t = truth(&g, &ray);
                 for (k, (name, accel)) in all.iter().enumerate() {
-                    let [wrong, finite, distance] = &mut m[3 * k..3 * k + 3] else {
-                        unreachable!("three for each of two backends")
-                    };
+                    let [wrong, finite, distance] = &mut m[k];
                     let sp = refined(&g, &**accel, &ray);
-                    if !t.near[usize::from(*name == "bvh")] {
+                    if !t.near[usize::from(exact(name))] {
                         wrong.must(sp.is_some() == t.hits);
                     }
                     finite.must(sp.as_ref().is_none_or(|sp| {
@@ -99,8 +98,8 @@ fn fuzz(
     for (k, name) in names.into_iter().enumerate() {
         let sum = |j: usize, worst: fn(f64, f64) -> f64| {
             found.iter().fold(Meter::default(), |a, m| Meter {
-                n: a.n + m[3 * k + j].n,
-                worst: worst(a.worst, m[3 * k + j].worst),
+                n: a.n + m[k][j].n,
+                worst: worst(a.worst, m[k][j].worst),
             })
         };
         row.line(name, "wrong beyond the bound", sum(0, |a, b| a + b), 0.0);
@@ -131,8 +130,8 @@ pub fn f1(row: &mut Row) {
         };
         let v = m.corners(0);
         let (o, d) = (ray.origin(), ray.direction());
-        let exact = ExactTriangle::new(o, d, v);
-        let hit = exact.hit();
+        let truth = ExactTriangle::new(o, d, v);
+        let hit = truth.hit();
         let reach = v.iter().map(|p| (*p - o).length()).fold(0.0, f64::max);
         let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
         let sin = (d.dot(e1.cross(e2)) / (d.length() * e1.cross(e2).length())).abs();
@@ -149,13 +148,14 @@ pub fn f1(row: &mut Row) {
         let t = hit.map(|h| h[0]);
         let starts = |u: f64| t.is_some_and(|t| t.abs() * d.length() * sin < 64.0 * u * reach);
         Truth {
-            hits: exact.inside() && t.is_some_and(|t| t >= 0.0),
+            hits: truth.inside() && t.is_some_and(|t| t >= 0.0),
             near: [U, U * U].map(|u| near(u) || starts(u)),
             // Edge-on, the place on the triangle is as good as its edge is.
             distance: t.filter(|_| sin > 1e-4),
             size: reach,
         }
     };
+    row.tried("sizes 1e-6 to 1e6, places up to 100 sizes out, heights down to 1e-4, D = 1 to 1000 sizes; seed 71");
     fuzz(row, 71, make, truth);
     row.note(
         "the bound is 16uD, times the length of an edge over its length as seen: an edge that a ray \
@@ -177,8 +177,7 @@ pub fn f2(row: &mut Row) {
         };
         let (c, r) = s.get(0);
         let (o, d) = (ray.origin(), ray.direction());
-        let exact = ExactSphere::new(o, d, c, r);
-        let roots = exact.roots();
+        let roots = ExactSphere::new(o, d, c, r).roots();
         let first = roots.and_then(|t| t.into_iter().find(|t| *t >= 0.0));
         let b = (o - c).cross(d).length() / d.length();
         let far = (o - c).length();
@@ -191,5 +190,6 @@ pub fn f2(row: &mut Row) {
             size: far.max(r),
         }
     };
+    row.tried("r = 1e-6 to 1e6, places up to 100 r out, D = 1 to 1000 r; seed 72");
     fuzz(row, 72, make, truth);
 }
