@@ -158,6 +158,13 @@ fn descs() -> Vec<(String, MaterialDesc)> {
                 name: "frosted glass pane".into(),
                 transmission: 1.0,
                 specular: 0.8,
+                ..plastic.clone()
+            },
+            MaterialDesc {
+                name: "filmed glass".into(),
+                transmission: 1.0,
+                volume: true,
+                iridescence: 1.0,
                 ..plastic
             },
         ];

@@ -46,6 +46,12 @@ pub fn dielectric(cos_i: f64, eta: f64) -> Dielectric {
     }
 }
 
+/// Reflectance at normal incidence between two indices of refraction.
+#[inline]
+pub fn f0(a: f64, b: f64) -> f64 {
+    ((a - b) / (a + b)).powi(2)
+}
+
 /// Reflected and transmitted colour of an interface that reflects `reflect` of what Fresnel says
 /// and colours what it transmits by `tint`. What is not reflected is transmitted, and under total
 /// internal reflection nothing is.
