@@ -232,6 +232,50 @@ fn units_are_those_of_the_files_writer_unless_they_are_given() {
 }
 
 #[test]
+fn what_surfaces_emit_is_in_the_units_of_the_lamps() {
+    let glowing = || {
+        let mut a = Asset::triangle();
+        a.json["extensionsUsed"] = json!(["KHR_materials_emissive_strength"]);
+        a.json["materials"] = json!([{
+            "emissiveFactor": [0.5, 0.5, 0.5],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}},
+        }]);
+        a.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+        a
+    };
+    // A radiance of 2 from one side of half a square metre: π A L.
+    let watts = PI * 0.5 * 2.0;
+    for (light_units, factor) in [
+        (LightUnits::Blender, 1.0),
+        (LightUnits::Photometric, 1.0 / 683.0),
+        (LightUnits::Radiometric, 1.0),
+        (LightUnits::Auto, 1.0),
+    ] {
+        let options = ImportOptions {
+            light_units,
+            ..Default::default()
+        };
+        let scene = glowing().read_with(&options).unwrap();
+        assert!(close(flux(&scene), factor * watts), "{light_units:?}");
+    }
+    // Beside a lamp the file's numbers are photometric, but Blender's are not.
+    for (generator, factor) in [("somebody", 1.0 / 683.0), ("Khronos glTF Blender I/O", 2.0)] {
+        let mut a = glowing();
+        a.json["asset"]["generator"] = json!(generator);
+        a.json["nodes"] = json!([
+            {"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}
+        ]);
+        a.json["scenes"] = json!([{"nodes": [0, 1]}]);
+        let lamp = json!({"type": "point", "intensity": 683.0});
+        a.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [lamp]}});
+        // Surfaces of Blender's files shine from both sides.
+        let want = 4.0 * PI + factor * watts;
+        let scene = a.read().unwrap();
+        assert!(close(flux(&scene), want), "{generator}");
+    }
+}
+
+#[test]
 fn strange_numbers_make_no_strange_light() {
     for (light, n) in [
         (json!({"type": "point", "intensity": -5}), 0),

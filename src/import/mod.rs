@@ -43,6 +43,7 @@ mod views;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
+use crate::color::units;
 pub use crate::color::units::LightUnits;
 use crate::error::{Error, Result};
 use crate::lights::LightDesc;
@@ -306,6 +307,8 @@ fn fill<'a>(
         SolidGlass::Always => true,
         SolidGlass::Never => false,
     };
+    let light_units = light::resolve(options.light_units, root, builder)?;
+    let radiance = units::radiance_factor(light_units);
     let colored = material::with_vertex_colors(root)?;
     for (i, m) in entries.iter().enumerate() {
         let mut desc = material::read(m, images, notes)?;
@@ -313,6 +316,7 @@ fn fill<'a>(
         // Backface culling, which this says of Blender's materials, is for its rasteriser alone:
         // in Cycles surfaces emit from both sides.
         desc.double_sided |= blender;
+        desc.emission *= radiance;
         let id = builder
             .add_material(&desc)
             .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
@@ -330,15 +334,6 @@ fn fill<'a>(
             ..Default::default()
         })
         .map_err(|e| Failure::Plugin("the default material".into(), Box::new(e)))?;
-    let light_units = light::resolve(options.light_units, root);
-    if root.extension("KHR_lights_punctual").is_some() && options.light_units == LightUnits::Auto {
-        builder.inform(match light_units {
-            LightUnits::Blender => {
-                "lights are taken as Blender exports them: divided by 683, spots by Cycles' curve"
-            }
-            _ => "lights are taken as candela and lux, at 683 lm/W",
-        });
-    }
     let mut walker = Walker {
         source,
         light_units,
@@ -360,20 +355,21 @@ fn fill<'a>(
              --solid-glass never takes them for thin walls"
         ));
     }
-    if let Some(light) = surroundings(&scene, root, images, path, options, notes)? {
+    if let Some(light) = surroundings(&scene, root, images, path, options, radiance, notes)? {
         builder.add_light(light);
     }
     Ok(())
 }
 
 /// Light from all around: what the user asks for goes before our extras, and these before the
-/// extension.
+/// extension, whose light is multiplied by `radiance`.
 fn surroundings<'a>(
     scene: &Cursor<'a>,
     root: &Cursor<'a>,
     images: &mut Images<'a>,
     path: &Path,
     options: &ImportOptions,
+    radiance: f64,
     notes: &mut Notes,
 ) -> Result<Option<LightDesc>, Failure> {
     let extras = environment::of_scene(scene, path, notes)?;
@@ -383,7 +379,11 @@ fn surroundings<'a>(
             .map(Some)
             .map_err(|e| Failure::Plugin(scene.path().to_owned(), Box::new(e)));
     }
-    Ok(image_based::of_scene(scene, root, images, notes)?)
+    let mut light = image_based::of_scene(scene, root, images, notes)?;
+    if let Some(light) = &mut light {
+        light.strength *= radiance;
+    }
+    Ok(light)
 }
 
 fn check_extensions(root: &Cursor<'_>, notes: &mut Notes) -> Result<(), Problem> {
