@@ -182,7 +182,7 @@ pub struct RenderArgs {
     /// differ. Adaptive is for a known --spp, not for images in passes
     #[arg(long, value_enum, default_value = "uniform", help_heading = "Image")]
     pub pixel_sampling: PixelSampling,
-    /// Camera to look through; auto frames the whole scene [default: the first of the scene]
+    /// Camera to look through; auto frames the whole scene [default: the first of the scene, or auto]
     #[arg(long, value_name = "NAME", help_heading = "Image")]
     pub camera: Option<String>,
     /// Render only the pixels from X0,Y0 (upper left) to just before X1,Y1; the rest is black

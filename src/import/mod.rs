@@ -29,6 +29,7 @@ mod mesh;
 mod meshopt;
 mod morph;
 mod node;
+mod scenes;
 mod schema;
 mod skin;
 mod solid;
@@ -212,8 +213,11 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
     let mut builder = SceneBuilder::new(plugins);
     builder.leave_out(options.omit);
     let mut notes = Notes::default();
-    let document = container::open(path, |root| check_extensions(root, &mut notes))
+    let mut document = container::open(path, |root| check_extensions(root, &mut notes))
         .map_err(|p| p.into_error(path))?;
+    if scenes::complete(&mut document.json).map_err(|p| p.into_error(path))? {
+        builder.inform("the file has no scenes: all of its nodes are shown");
+    }
     let root = Cursor::root(&document.json);
     let source = Source::new(root.clone(), &document.buffers, document.size);
     let mut images = Images::new(&source, path);
@@ -288,7 +292,7 @@ fn fill<'a>(
     }
     let pose = animation::pose(source, options, notes)?;
     let variant = variants::choose(root, options.variant.as_deref())?;
-    let scene = chosen_scene(root, options)?;
+    let scene = scenes::chosen(root, options, builder)?;
     let roots = scene.items("nodes")?;
     let used = used::materials(root, &roots)?;
     let entries = root.items("materials")?;
@@ -404,34 +408,4 @@ fn check_extensions(root: &Cursor<'_>, notes: &mut Notes) -> Result<(), Problem>
         }
     }
     Ok(())
-}
-
-/// The scene that is rendered.
-fn chosen_scene<'a>(root: &Cursor<'a>, options: &ImportOptions) -> Result<Cursor<'a>, Problem> {
-    let scenes = root.items("scenes")?;
-    let chosen = match &options.scene {
-        Some(name) => {
-            let named = |s: &&Cursor<'_>| s.get("name").is_some_and(|n| n.value() == name.as_str());
-            Some(scenes.iter().find(named).cloned().ok_or_else(|| {
-                let known: Vec<String> = scenes.iter().map(Cursor::name).collect();
-                Problem {
-                    remedy: format!("known scenes: {}", known.join(", ")),
-                    ..Problem::invalid("/scenes", format!("none is named '{name}'"))
-                }
-            })?)
-        }
-        None => match root.get("scene") {
-            Some(at) => Some(
-                scenes
-                    .get(at.index()?)
-                    .cloned()
-                    .ok_or_else(|| at.problem("names a scene that does not exist"))?,
-            ),
-            None => scenes.first().cloned(),
-        },
-    };
-    chosen.ok_or_else(|| Problem {
-        remedy: "export the file with a scene".into(),
-        ..Problem::invalid("/scenes", "the file holds no scene")
-    })
 }
