@@ -14,6 +14,7 @@ mod draco;
 mod environment;
 mod extras;
 mod hierarchy;
+mod ignored;
 mod image;
 mod image_based;
 mod implicit;
@@ -316,6 +317,7 @@ fn fill<'a>(
     let colored = material::with_vertex_colors(root)?;
     for (i, m) in entries.iter().enumerate() {
         let mut desc = material::read(m, images, notes)?;
+        ignored::tell(m, root, notes)?;
         desc.vertex_colors = colored.contains(&Some(i));
         // Backface culling, which this says of Blender's materials, is for its rasteriser alone:
         // in Cycles surfaces emit from both sides.
