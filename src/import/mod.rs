@@ -55,7 +55,9 @@ use accessor::Source;
 pub use environment::{EnvironmentOption, EnvironmentSource};
 use hierarchy::Hierarchy;
 use image::Images;
-pub use inventory::{AnimationInfo, Extensions, ImageInfo, Inventory, MaterialInfo, inventory};
+pub use inventory::{
+    AnimationInfo, Extensions, ImageInfo, Inventory, MaterialInfo, extensions, inventory,
+};
 use json::Cursor;
 use node::Walker;
 pub use solid::SolidGlass;
