@@ -4,7 +4,7 @@ use super::Bsdf;
 use super::bsdf::FrameId;
 use super::cover::Cover;
 use super::dielectric::Interface;
-use super::fresnel::{Fresnel, Schlick, f0};
+use super::fresnel::{Film, Fresnel, Schlick, f0};
 use super::layer::LayerAlbedo;
 use super::lobes::{
     CoatedLambert, DiffuseTransmission, GgxReflection, Lambert, Lobe, Sheen, SmoothReflection,
@@ -169,15 +169,14 @@ impl Values {
         };
         let fresnel = match film {
             None => Fresnel::Schlick(schlick),
-            Some((film, strength)) => {
-                let share = self.metallic + opaque;
-                Fresnel::Film {
-                    base: schlick,
-                    film,
-                    strength,
-                    share,
-                }
-            }
+            Some((film, strength)) => Fresnel::Film(Film {
+                film,
+                strength,
+                metal: self.base_color,
+                metallic: self.metallic,
+                dielectric: layer,
+                opaque,
+            }),
         };
         bsdf.push(reflection(self.is_smooth(), self.ggx(), fresnel));
 
@@ -203,14 +202,16 @@ impl Values {
 
     /// What the reflecting layer above the diffuse base sends back, largest channel.
     fn layer_albedo(&self, layer: &Schlick, film: Option<&(ThinFilm, f64)>) -> LayerAlbedo {
-        let f0 = match film {
-            None => layer.f0.max_channel(),
+        let (f0, f90) = match film {
+            None => (layer.f0.max_channel(), layer.f90),
             Some((film, strength)) => {
-                let bare = layer.f0.max_channel() * (1.0 - strength);
-                bare + film.bound(layer.f0) * strength
+                let mix = |bare: f64, filmed: f64| bare * (1.0 - strength) + filmed * strength;
+                // A film reflects everything at grazing angles, however weak the base is.
+                let f0 = mix(layer.f0.max_channel(), film.bound(layer.f0));
+                (f0, mix(layer.f90, 1.0))
             }
         };
-        LayerAlbedo::new(self.roughness, f0.min(1.0), layer.f90.max(f0.min(1.0)), 1.0)
+        LayerAlbedo::new(self.roughness, f0.min(1.0), f90.max(f0.min(1.0)), 1.0)
     }
 
     /// Of a material whose values lie between `low` and `high`: what it may do anywhere.
