@@ -7,7 +7,8 @@
 Blender's own exporter writes the file. What it drops goes into `extras` under the names of
 docs/blender.md: area lamps, the size of lamps, the world, lenses and sensor shift. Glass that
 fills a closed mesh becomes a volume, absorption is converted, and lamps on which the exporter
-fails are rewritten first. The .blend itself is not changed.
+fails are rewritten first. What is hidden from rendering is left out. The .blend itself is not
+changed.
 """
 
 import argparse
@@ -24,6 +25,73 @@ PHOTOMETRIC = 683.0  # what the exporter multiplies lamps by
 
 def warn(text):
     print(f"blender_export: warning: {text}", file=sys.stderr)
+
+
+# ------------------------------------------------------------------ what is rendered
+
+HIDDEN = "dualight_hidden"  # marks objects for `complete`, and does not reach the file
+
+
+def members(collection):
+    """Objects of a collection that is instanced, as far as renderings show them."""
+    if collection.hide_render:
+        return set()
+    out = {ob for ob in collection.objects if not ob.hide_render}
+    return out.union(*(members(c) for c in collection.children))
+
+
+def rendered(scene):
+    """The objects that a rendering of the scene shows: neither they, nor all collections that
+    they are in, are switched off for rendering or excluded from the view layers."""
+    def below(layer):
+        if layer.collection.hide_render:
+            return set()
+        own = [] if layer.exclude else layer.collection.objects
+        out = {ob for ob in own if not ob.hide_render}
+        return out.union(*(below(child) for child in layer.children))
+
+    out = set().union(*(below(v.layer_collection) for v in scene.view_layers if v.use))
+    fresh = list(out)
+    while fresh:
+        ob = fresh.pop()
+        if ob.instance_type == 'COLLECTION' and ob.instance_collection:
+            more = members(ob.instance_collection) - out
+            out |= more
+            fresh += more
+    return out
+
+
+def hide_others(scenes, shown):
+    """Makes the exporter leave out what no rendering shows. It goes by the objects and by the
+    collections right above them only, and takes instanced collections whole: what it writes all
+    the same is marked. Cameras are looked through even if they are hidden."""
+    for ob in bpy.data.objects:
+        if ob.type == 'CAMERA':
+            ob.hide_render = False
+        elif ob not in shown:
+            ob.hide_render = True
+            ob[HIDDEN] = True
+    for scene in scenes:
+        for ob in scene.objects:
+            # The exporter takes objects for hidden that are in hidden collections alone, and for
+            # shown those that stand in the scene itself.
+            keep = ob.type == 'CAMERA' or ob in shown
+            if keep and all(c.hide_render for c in ob.users_collection):
+                scene.collection.objects.link(ob)
+
+
+def strip(doc):
+    """Takes from marked nodes what could be seen of them; their children stay in place."""
+    for node in doc.get("nodes", []):
+        if not node.get("extras", {}).pop(HIDDEN, False):
+            continue
+        for key in ("mesh", "skin", "weights"):
+            node.pop(key, None)
+        node.get("extensions", {}).pop("KHR_lights_punctual", None)
+        node.get("extensions", {}).pop("EXT_mesh_gpu_instancing", None)
+        for key in ("extras", "extensions"):
+            if key in node and not node[key]:
+                del node[key]
 
 
 # ------------------------------------------------------------------ lamps
@@ -67,11 +135,11 @@ def power_of(lamp, ob):
     return power if lamp.normalize else power * surface_of(lamp, ob)
 
 
-def collect_lamps(scene):
-    """By object name: what the file is to say of each lamp."""
+def collect_lamps(shown):
+    """By object name: what the file is to say of each lamp among the objects `shown`."""
     out = {}
-    for ob in scene.objects:
-        if ob.type != 'LIGHT' or ob.hide_render:
+    for ob in sorted(shown, key=lambda ob: ob.name):
+        if ob.type != 'LIGHT':
             continue
         lamp = ob.data
         if lamp.use_nodes and any(n.type not in {'EMISSION', 'OUTPUT_LIGHT'}
@@ -240,12 +308,13 @@ def is_closed(mesh):
     return bool(edges) and all(n == edges.get((b, a), 0) for (a, b), n in edges.items())
 
 
-def collect_glass(scene):
-    """By material name: thickness and absorption of what fills closed meshes."""
+def collect_glass(shown):
+    """By material name: thickness and absorption of what fills closed meshes among the objects
+    `shown`."""
     graph = bpy.context.evaluated_depsgraph_get()
     closed, size = {}, {}
-    for ob in scene.objects:
-        if ob.type not in {'MESH', 'CURVE', 'SURFACE', 'META', 'FONT'} or ob.hide_render:
+    for ob in shown:
+        if ob.type not in {'MESH', 'CURVE', 'SURFACE', 'META', 'FONT'}:
             continue
         used = [s.material for s in ob.material_slots if s.material]
         glass = [m for m in used if is_glass(m)]
@@ -317,33 +386,38 @@ def ours(owner, entry):
         extras["dualight"] = {**extras.get("dualight", {}), **entry}
 
 
+def tell_lamp(node, lights, entry):
+    ours(node, entry.get("node"))
+    link = node.get("extensions", {}).get("KHR_lights_punctual")
+    if link is None or "light" not in entry:
+        return
+    light = lights[link["light"]]
+    ours(light, entry["light"])
+    # The exporter goes by the mode that was chosen; the power is known here.
+    per_steradian = 1.0 if entry["type"] == 'SUN' else 1.0 / (4.0 * math.pi)
+    light["intensity"] = entry["power"] * per_steradian * PHOTOMETRIC
+    light["color"] = entry["color"]
+
+
 def complete(path, per_scene, glass):
     """Adds to the exported file what was collected."""
     doc, rest = read_glb(path)
+    strip(doc)
     nodes = {}
-    for i, node in enumerate(doc.get("nodes", [])):
-        nodes.setdefault(node.get("name"), i)
+    for node in doc.get("nodes", []):
+        nodes.setdefault(node.get("name"), []).append(node)
     lights = doc.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
     for scene, (lamps, cameras, world) in per_scene.items():
         for name, entry in {**lamps, **cameras}.items():
             if name not in nodes:
                 warn(f"'{name}' did not reach the file")
                 continue
-            node = doc["nodes"][nodes[name]]
-            if name in cameras:
-                if "camera" in node:
+            # Objects of instanced collections stand in several places.
+            for node in nodes[name]:
+                if name not in cameras:
+                    tell_lamp(node, lights, entry)
+                elif "camera" in node:
                     ours(doc["cameras"][node["camera"]], entry)
-                continue
-            ours(node, entry.get("node"))
-            link = node.get("extensions", {}).get("KHR_lights_punctual")
-            if link is None or "light" not in entry:
-                continue
-            light = lights[link["light"]]
-            ours(light, entry["light"])
-            # The exporter goes by the mode that was chosen; the power is known here.
-            per_steradian = 1.0 if entry["type"] == 'SUN' else 1.0 / (4.0 * math.pi)
-            light["intensity"] = entry["power"] * per_steradian * PHOTOMETRIC
-            light["color"] = entry["color"]
         if world:
             for s in doc.get("scenes", []):
                 if s.get("name") == scene:
@@ -379,19 +453,21 @@ def main(argv):
         bpy.ops.wm.open_mainfile(filepath=os.path.abspath(args.blend))
     out = os.path.abspath(args.out)
     scenes = list(bpy.data.scenes)
-    glass = collect_glass(bpy.context.scene)
+    shown = {s.name: rendered(s) for s in scenes}
+    glass = collect_glass(shown[bpy.context.scene.name])
     for scene in scenes:
         if scene is not bpy.context.scene:
-            glass = {**collect_glass(scene), **glass}
-    per_scene = {s.name: (collect_lamps(s), collect_cameras(s),
+            glass = {**collect_glass(shown[scene.name]), **glass}
+    per_scene = {s.name: (collect_lamps(shown[s.name]), collect_cameras(s),
                           collect_world(s, out if s is bpy.context.scene else
                                         out[:-4] + "_" + s.name + ".glb"))
                  for s in scenes}
     for lamps, _, _ in per_scene.values():
         tame_lamps(lamps)
+    hide_others(scenes, set().union(*shown.values()))
     bpy.ops.export_scene.gltf(
         filepath=out, export_format='GLB', export_cameras=True, export_lights=True,
-        export_extras=True, export_apply=True, export_yup=True,
+        export_extras=True, export_apply=True, export_yup=True, use_renderable=True,
         export_import_convert_lighting_mode='SPEC',
         export_animations=not args.no_animations)
     complete(out, per_scene, glass)

@@ -70,7 +70,7 @@ pub struct RenderSettings {
     pub progressive: Option<Progressive>,
     /// Part of the image to render: left, top, right, bottom in pixels; the rest stays black.
     pub crop: Option<[u32; 4]>,
-    /// Name of the camera; `None` for the first.
+    /// Name of the camera; `None` for the first, or one that frames the scene if it has none.
     pub camera: Option<String>,
     /// Threads; `None` for one per processor.
     pub threads: Option<usize>,
@@ -115,7 +115,7 @@ pub struct Rendering {
 /// Renders a scene.
 ///
 /// # Errors
-/// Names that no plugin or camera has, a scene without a camera, a backend that fails.
+/// Names that no plugin or camera has, a backend that fails.
 pub fn render(
     scene: &Scene,
     settings: &RenderSettings,
@@ -380,43 +380,41 @@ fn components(set: EffectSet) -> Vec<Component> {
         .collect()
 }
 
-/// The camera that the settings name, or the first of the scene.
+/// The name by which a camera is asked for that frames the whole scene.
+pub const AUTO_CAMERA: &str = "auto";
+
+/// The camera that the settings name, or the first of the scene; one that frames the whole scene
+/// where there is none.
 ///
 /// # Errors
-/// A name that no camera has, a scene without a camera.
+/// A name that no camera has, a camera that cannot be.
 pub fn choose_camera(
     scene: &Scene,
     settings: &RenderSettings,
     registry: &Registry,
 ) -> Result<Box<dyn crate::cameras::Camera>> {
     let aspect = f64::from(settings.width) / f64::from(settings.height);
-    let auto;
     let desc = match &settings.camera {
-        None => scene.cameras.first().ok_or_else(|| {
-            Error::Usage(
-                "the scene has no camera; add one and export it with the scene, or let \
-                 --camera auto frame it"
-                    .into(),
-            )
-        })?,
-        Some(name) if name == "auto" && scene.cameras.iter().all(|c| c.name != "auto") => {
-            auto = framing(&scene.bounds.bounding_sphere(), aspect);
-            &auto
+        None => scene.cameras.first(),
+        Some(name) => {
+            let named = scene.cameras.iter().find(|c| c.name == *name);
+            if named.is_none() && name != AUTO_CAMERA {
+                let names = scene.cameras.iter().map(|c| c.name.as_str());
+                return Err(Error::UnknownPlugin {
+                    kind: "camera",
+                    name: name.clone(),
+                    known: names.chain([AUTO_CAMERA]).collect::<Vec<_>>().join(", "),
+                });
+            }
+            named
         }
-        Some(name) => scene
-            .cameras
-            .iter()
-            .find(|c| c.name == *name)
-            .ok_or_else(|| Error::UnknownPlugin {
-                kind: "camera",
-                name: name.clone(),
-                known: scene
-                    .cameras
-                    .iter()
-                    .map(|c| c.name.as_str())
-                    .collect::<Vec<_>>()
-                    .join(", "),
-            })?,
+    };
+    let framed;
+    let desc = if let Some(desc) = desc {
+        desc
+    } else {
+        framed = framing(&scene.bounds.bounding_sphere(), aspect);
+        &framed
     };
     let entry = registry.cameras.find(desc.kind)?;
     (entry.build)(desc, aspect)

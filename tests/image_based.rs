@@ -8,6 +8,7 @@ use std::io::Cursor;
 
 use asset::Asset;
 use dualight::color::srgb_to_linear;
+use dualight::import::{ImportOptions, LightUnits};
 use dualight::math::DVec3;
 use image::{ImageFormat, Rgba, RgbaImage};
 use serde_json::{Value, json};
@@ -80,6 +81,27 @@ fn every_face_shines_from_where_it_belongs() {
         (power / fluence - 1.0).abs() < 0.01,
         "{power} for {fluence}"
     );
+}
+
+#[test]
+fn photometric_surroundings_are_in_candela_per_square_metre() {
+    let a = lit([255; 6], [255; 6]);
+    let radiance = |light_units| {
+        let options = ImportOptions {
+            light_units,
+            ..Default::default()
+        };
+        a.read_with(&options).unwrap().lights[0].escaped(DVec3::X).r
+    };
+    for (units, want) in [
+        (LightUnits::Photometric, 2.0 / 683.0),
+        (LightUnits::Radiometric, 2.0),
+        (LightUnits::Blender, 2.0),
+        // No lamp that they would have to be in proportion to.
+        (LightUnits::Auto, 2.0),
+    ] {
+        assert!((radiance(units) / want - 1.0).abs() < 1e-5, "{units:?}");
+    }
 }
 
 #[test]

@@ -88,6 +88,90 @@ fn area_lights_have_the_power_and_the_colour_they_name() {
 }
 
 #[test]
+fn what_a_material_says_without_effect_is_told_by_its_name() {
+    let material = |m: Value| {
+        let mut a = Asset::triangle();
+        a.json["materials"] = json!([m]);
+        a.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+        a
+    };
+    let warnings = |m: Value| material(m).read().unwrap().warnings;
+    // All that the specifications list but thickness by texture, which needs no image here.
+    let all = json!({
+        "name": "full", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.5,
+        "emissiveFactor": [0, 0, 0], "extras": {"any": 1},
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [1, 1, 1, 1], "metallicFactor": 0, "roughnessFactor": 1,
+        },
+        "extensions": {
+            "KHR_materials_anisotropy": {"anisotropyStrength": 0, "anisotropyRotation": 0},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0, "clearcoatRoughnessFactor": 0},
+            "KHR_materials_diffuse_transmission": {
+                "diffuseTransmissionFactor": 0, "diffuseTransmissionColorFactor": [1, 1, 1],
+            },
+            "KHR_materials_dispersion": {"dispersion": 0},
+            "KHR_materials_emissive_strength": {"emissiveStrength": 1},
+            "KHR_materials_ior": {"ior": 1.5},
+            "KHR_materials_iridescence": {
+                "iridescenceFactor": 0, "iridescenceIor": 1.3,
+                "iridescenceThicknessMinimum": 100, "iridescenceThicknessMaximum": 400,
+            },
+            "KHR_materials_sheen": {"sheenColorFactor": [0, 0, 0], "sheenRoughnessFactor": 0},
+            "KHR_materials_specular": {"specularFactor": 1, "specularColorFactor": [1, 1, 1]},
+            "KHR_materials_transmission": {"transmissionFactor": 1},
+            "KHR_materials_volume": {
+                "thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [1, 1, 1],
+            },
+        },
+    });
+    assert_eq!(warnings(all), Vec::<String>::new());
+    let volume = |more: Value| {
+        let mut v = json!({"thicknessFactor": 1.0, "thicknessTexture": {"index": 0}});
+        v.as_object_mut()
+            .unwrap()
+            .extend(more.as_object().unwrap().clone());
+        json!({"name": "tea", "extensions": {"KHR_materials_volume": v}})
+    };
+    let told = warnings(volume(json!({})));
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(
+        told[0].contains("material 'tea': thicknessTexture of KHR_materials_volume is ignored"),
+        "{told:?}"
+    );
+    let told = warnings(volume(json!({"thickness": 3})));
+    assert!(
+        told.iter().any(|w| w.contains("'tea': thickness of")),
+        "{told:?}"
+    );
+    let told = warnings(json!({
+        "name": "odd", "shininess": 3, "pbrMetallicRoughness": {"metalicFactor": 0},
+        "extensions": {"EXT_nobody_knows": {}},
+    }));
+    for part in [
+        "'odd': shininess is ignored",
+        "'odd': metalicFactor of pbrMetallicRoughness",
+        "'odd': EXT_nobody_knows is not supported",
+    ] {
+        assert!(told.iter().any(|w| w.contains(part)), "{part}: {told:?}");
+    }
+    // One line is enough for what the file declares.
+    let mut a = material(json!({"extensions": {"EXT_nobody_knows": {}}}));
+    a.json["extensionsUsed"] = json!(["EXT_nobody_knows"]);
+    assert_eq!(a.read().unwrap().warnings.len(), 1);
+}
+
+#[test]
+fn a_file_that_needs_a_newer_gltf_is_refused() {
+    let mut a = Asset::triangle();
+    a.json["asset"] = json!({"version": "2.1", "minVersion": "2.0"});
+    assert!(a.read().is_ok());
+    a.json["asset"]["minVersion"] = json!("2.1");
+    let e = a.read().err().unwrap();
+    assert_eq!(e.exit_code(), 3);
+    assert!(e.to_string().contains("/asset/minVersion"), "{e}");
+}
+
+#[test]
 fn what_is_wrong_in_our_extras_is_told_with_its_place() {
     let place = "/nodes/1/extras/dualight/area_light";
     for (bad, at, what) in [
@@ -228,6 +312,54 @@ fn units_are_those_of_the_files_writer_unless_they_are_given() {
         };
         let scene = with_light(light.clone()).read_with(&options).unwrap();
         assert!(scene.notes.is_empty() && close(flux(&scene), factor * 4.0 * PI));
+    }
+}
+
+#[test]
+fn what_surfaces_emit_is_in_the_units_of_the_lamps() {
+    let glowing = || {
+        let mut a = Asset::triangle();
+        a.json["extensionsUsed"] = json!(["KHR_materials_emissive_strength"]);
+        a.json["materials"] = json!([{
+            "emissiveFactor": [0.5, 0.5, 0.5],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}},
+        }]);
+        a.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+        a
+    };
+    // A radiance of 2 from one side of half a square metre: π A L.
+    let watts = PI * 0.5 * 2.0;
+    for (light_units, factor) in [
+        (LightUnits::Blender, 1.0),
+        (LightUnits::Photometric, 1.0 / 683.0),
+        (LightUnits::Radiometric, 1.0),
+        (LightUnits::Auto, 1.0),
+    ] {
+        let options = ImportOptions {
+            light_units,
+            ..Default::default()
+        };
+        let scene = glowing().read_with(&options).unwrap();
+        assert!(close(flux(&scene), factor * watts), "{light_units:?}");
+    }
+    // What is unlit shines for nobody, whatever else the material says.
+    let mut unlit = glowing();
+    unlit.json["materials"][0]["extensions"]["KHR_materials_unlit"] = json!({});
+    assert!(unlit.read().unwrap().lights.is_empty());
+    // Beside a lamp the file's numbers are photometric, but Blender's are not.
+    for (generator, factor) in [("somebody", 1.0 / 683.0), ("Khronos glTF Blender I/O", 2.0)] {
+        let mut a = glowing();
+        a.json["asset"]["generator"] = json!(generator);
+        a.json["nodes"] = json!([
+            {"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}
+        ]);
+        a.json["scenes"] = json!([{"nodes": [0, 1]}]);
+        let lamp = json!({"type": "point", "intensity": 683.0});
+        a.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [lamp]}});
+        // Surfaces of Blender's files shine from both sides.
+        let want = 4.0 * PI + factor * watts;
+        let scene = a.read().unwrap();
+        assert!(close(flux(&scene), want), "{generator}");
     }
 }
 

@@ -6,8 +6,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use dualight::control::Control;
 use dualight::import::{ImportOptions, load};
-use dualight::scene::{Census, ScenePlugins};
+use dualight::pipeline::{self, RenderSettings};
+use dualight::plugins::Registry;
+use dualight::scene::{Census, Scene, ScenePlugins};
 
 /// Legal files that hold nothing to render, and are refused for that: no node has a mesh that
 /// makes a surface.
@@ -25,12 +28,42 @@ fn left_out(error: &str) -> bool {
     built.iter().any(|(name, built)| !built && named(*name))
 }
 
+/// Renders a tiny picture by each way of making one, and tells what is wrong with it.
+fn picture(scene: &Scene, registry: &Registry) -> Result<(), String> {
+    for integrator in ["path", "photon"] {
+        let mut settings = RenderSettings {
+            width: 16,
+            height: 12,
+            spp: 1,
+            integrator: Some(integrator.into()),
+            threads: Some(1),
+            ..Default::default()
+        };
+        settings.integrator_settings.photons = 200;
+        settings.integrator_settings.caustic_photons = 200;
+        let rendering = pipeline::render(scene, &settings, registry, &Control::default())
+            .map_err(|e| format!("{integrator}: {e}"))?;
+        if rendering.film.rejected() > 0 {
+            return Err(format!("{integrator}: samples are not finite"));
+        }
+        let image = rendering.film.develop();
+        let seen = image.channel("", "A").unwrap_or_default();
+        if scene.cameras.is_empty() && seen.iter().all(|a| *a == 0.0) {
+            return Err(format!(
+                "{integrator}: the camera that was made sees nothing"
+            ));
+        }
+    }
+    Ok(())
+}
+
 #[test]
-fn every_file_is_read_or_refused_as_the_index_says() {
+fn every_file_is_rendered_or_refused_as_the_index_says() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/real");
     let Ok(index) = fs::read_to_string(folder.join("index.tsv")) else {
         return;
     };
+    let registry = Registry::builtin();
     let (mut wrong, mut count) = (Vec::new(), BTreeMap::new());
     for line in index.lines().skip(1) {
         let column: Vec<&str> = line.split('\t').collect();
@@ -50,6 +83,9 @@ fn every_file_is_read_or_refused_as_the_index_says() {
                 let seen = Census::new(&scene).placed_triangles;
                 if seen < expected / 2 && scene.warnings.is_empty() {
                     wrong.push(format!("{path}: {seen} triangles of {expected}"));
+                }
+                if let Err(e) = picture(&scene, &registry) {
+                    wrong.push(format!("{path}: {e}"));
                 }
             }
             Ok(_) => wrong.push(format!("{kind} was read: {path}")),

@@ -124,3 +124,42 @@ fn a_file_is_told_as_it_is() {
     assert_eq!(v["file"]["images"][0]["size"], json!([3, 2]));
     assert_eq!(v["file"]["animations"][0]["end"], json!(2.5));
 }
+
+#[test]
+fn a_refused_file_is_told_with_all_of_its_extensions() {
+    let mut a = everything();
+    a.json["extensionsRequired"] = json!(["KHR_materials_clearcoat", "EXT_none", "EXT_unlisted"]);
+    // Nothing beyond the JSON is read.
+    a.json["images"] = json!([{"uri": "missing.png"}]);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("new.gltf");
+    std::fs::write(&path, a.text()).unwrap();
+    let run = |words: &[&str]| {
+        let out = Command::new(env!("CARGO_BIN_EXE_dualight"))
+            .arg("inspect")
+            .arg(&path)
+            .args(words)
+            .output()
+            .unwrap();
+        assert_eq!(out.status.code(), Some(3));
+        let error = String::from_utf8(out.stderr).unwrap();
+        assert!(error.contains("/extensionsRequired/1"), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+        String::from_utf8(out.stdout).unwrap()
+    };
+    let text = run(&[]);
+    let rows: Vec<&str> = text.lines().map(str::trim).collect();
+    assert_eq!(
+        rows,
+        [
+            "extension  KHR_materials_clearcoat: required",
+            "extension  KHR_materials_variants",
+            "extension  EXT_none: required, not supported",
+            "extension  EXT_unlisted: required, not supported",
+        ]
+    );
+    let v: Value = serde_json::from_str(&run(&["--json"])).unwrap();
+    let told = &v["file"]["extensions"];
+    assert_eq!(told["ignored"], json!(["EXT_none", "EXT_unlisted"]));
+    assert_eq!(told["required"].as_array().unwrap().len(), 3);
+}

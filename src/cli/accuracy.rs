@@ -148,10 +148,7 @@ fn base(args: &AccuracyArgs, scene: &Scene) -> RenderSettings {
         }
     });
     let mut base = RenderSettings {
-        camera: args
-            .camera
-            .clone()
-            .or_else(|| camera.is_none().then(|| "auto".into())),
+        camera: args.camera.clone(),
         width: size.width,
         height: size.height,
         threads: args.threads.map(|n| n as usize),

@@ -186,7 +186,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "on|off", default_value = "on", value_parser = values::on_off)]
     #[arg(help_heading = "Image", action = clap::ArgAction::Set)]
     pub interpolation: bool,
-    /// Camera to look through; auto frames the whole scene [default: the first of the scene]
+    /// Camera to look through; auto frames the whole scene [default: the first of the scene, or auto]
     #[arg(long, value_name = "NAME", help_heading = "Image")]
     pub camera: Option<String>,
     /// Render only the pixels from X0,Y0 (upper left) to just before X1,Y1; the rest is black

@@ -98,7 +98,6 @@ fn settings(args: &CompareArgs, scene: &Scene) -> RenderSettings {
         }
     });
     let mut settings = RenderSettings {
-        camera: camera.is_none().then(|| "auto".into()),
         width: size.width,
         height: size.height,
         spp: args.spp.max(1),

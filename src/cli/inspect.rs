@@ -8,8 +8,8 @@ use super::args::InspectArgs;
 use super::plan::import_options;
 use super::{Ending, console};
 use crate::effects;
-use crate::error::Result;
-use crate::import::{self, Inventory};
+use crate::error::{Error, Result};
+use crate::import::{self, Extensions, Inventory};
 use crate::plugins::Registry;
 use crate::scene::{Census, Scene};
 
@@ -17,7 +17,15 @@ use crate::scene::{Census, Scene};
 pub(super) fn run(args: &InspectArgs) -> Result<Ending> {
     let registry = Registry::builtin();
     let file = &args.scene.file;
-    let scene = import::load(file, &import_options(&args.scene), registry.scene.clone())?;
+    let loaded = import::load(file, &import_options(&args.scene), registry.scene.clone());
+    let scene = match loaded {
+        Err(Error::Unsupported { .. }) => {
+            // Which extensions stand in the way is what the user wants to know then.
+            tell_extensions(&import::extensions(file)?, args.json)?;
+            loaded?
+        }
+        other => other?,
+    };
     let effects = effects::survey(&scene, "auto", &registry.effects)?;
     let mut report = Report::new(&scene, import::inventory(file)?);
     report.effects = effects
@@ -210,16 +218,7 @@ impl Report {
         for v in &file.variants {
             row("variant", v.clone());
         }
-        for e in &file.extensions.used {
-            let mut state = Vec::new();
-            if file.extensions.required.contains(e) {
-                state.push("required".to_string());
-            }
-            if file.extensions.ignored.contains(e) {
-                state.push("ignored".to_string());
-            }
-            row("extension", line(e, &state));
-        }
+        extensions(&file.extensions, &mut row);
         for e in &self.effects {
             let state = if e.on { "on" } else { "skipped" };
             row("effect", format!("{:<13}{state:<9}{}", e.name, e.reason));
@@ -232,6 +231,36 @@ impl Report {
         }
         out
     }
+}
+
+/// One row for each extension.
+fn extensions(all: &Extensions, row: &mut impl FnMut(&str, String)) {
+    for e in &all.used {
+        let mut state = Vec::new();
+        let required = all.required.contains(e);
+        if required {
+            state.push("required".to_string());
+        }
+        if all.ignored.contains(e) {
+            state.push(if required { "not supported" } else { "ignored" }.to_string());
+        }
+        row("extension", line(e, &state));
+    }
+}
+
+/// Tells the extensions of a file that is refused.
+fn tell_extensions(all: &Extensions, json: bool) -> Result<()> {
+    let mut out = String::new();
+    if json {
+        let file = serde_json::json!({"file": {"extensions": all}});
+        let _ = writeln!(out, "{file:#}");
+    } else {
+        // Writing to a string does not fail.
+        extensions(all, &mut |name, value| {
+            let _ = writeln!(out, "{name:>10}  {value}");
+        });
+    }
+    console::print(&out)
 }
 
 /// A name and what is said of it.

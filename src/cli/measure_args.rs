@@ -44,7 +44,7 @@ pub struct AccuracyArgs {
     /// Size of the pictures in pixels [default: 128 wide, as high as the camera asks for]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// Camera to look through; auto frames the whole scene [default: the first of the scene]
+    /// Camera to look through; auto frames the whole scene [default: the first of the scene, or auto]
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     /// Exposure in stops at which FLIP and the page look at pictures

@@ -32,7 +32,7 @@ pub struct PhotonsArgs {
     /// Size of the picture in pixels [default: 512 wide, as high as the camera asks for]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// Camera to look through; auto frames the whole scene [default: the first of the scene]
+    /// Camera to look through; auto frames the whole scene [default: the first of the scene, or auto]
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     /// Ray tracing backend [see dualight plugins]

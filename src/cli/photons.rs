@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::photon_args::PhotonsArgs;
-use super::plan::{default_size, import_options};
+use super::plan::{camera_note, default_size, import_options};
 use super::{Ending, console, format, progress, signal};
 use crate::control::Control;
 use crate::error::Result;
@@ -27,6 +27,9 @@ pub(super) fn run(args: &PhotonsArgs) -> Result<Ending> {
         &import_options(&args.scene),
         registry.scene.clone(),
     )?;
+    if let Some(note) = camera_note(&scene, args.camera.as_deref()).filter(|_| !args.quiet) {
+        console::say(format_args!("note: {note}"));
+    }
     let threads = args.threads.map(|n| n as usize);
     let view = pipeline::in_pool(threads, || look(args, &scene, &registry, &control))??;
     if let Some(why) = control.stopped() {

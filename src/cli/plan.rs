@@ -279,6 +279,15 @@ pub fn import_options(args: &SceneArgs) -> ImportOptions {
     }
 }
 
+/// What to tell about the camera of a scene that brings none, if it is looked through: `asked` is
+/// the one that was asked for.
+pub fn camera_note(scene: &Scene, asked: Option<&str>) -> Option<&'static str> {
+    (scene.cameras.is_empty() && asked.is_none()).then_some(
+        "the scene has no camera: one was made that frames all of it; give the file cameras, and \
+         --camera NAME looks through another than its first",
+    )
+}
+
 /// The size of an image for a camera of the given aspect, if it has one.
 pub(super) fn default_size(aspect: Option<f64>) -> Size {
     let aspect = aspect.filter(|a| a.is_finite() && *a > 0.0).unwrap_or(1.0);

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::args::RenderArgs;
 use super::keep::Keeper;
-use super::plan::{Plan, StatisticsTarget};
+use super::plan::{Plan, StatisticsTarget, camera_note};
 use super::summary::{self, Summary};
 use super::{Ending, console, progress, signal};
 use crate::control::{Control, Stopped};
@@ -47,6 +47,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
     let (integrator, reason) = plan.integrator_for(&scene, &registry)?;
     let settings = plan.settings_for(&scene, integrator)?;
     if !plan.quiet {
+        if let Some(note) = camera_note(&scene, settings.camera.as_deref()) {
+            console::say(format_args!("note: {note}"));
+        }
         let needs = registry.integrators.find(integrator)?.photons;
         for option in plan.idle_options(needs) {
             console::say(format_args!(

@@ -32,7 +32,6 @@ pub(super) fn run(args: &ReproduceArgs) -> Result<Ending> {
         registry.scene.clone(),
     )?;
     let mut base = RenderSettings {
-        camera: scene.cameras.is_empty().then(|| "auto".into()),
         width: args.size.width,
         height: args.size.height,
         spp: args.spp,

@@ -151,6 +151,16 @@ fn check_version(root: &Cursor<'_>) -> Result<(), Problem> {
             "convert the file to glTF 2.0",
         ));
     }
+    // What the file needs at least (glTF 2.0, 3.2); its own version may be newer than that.
+    if let Some(least) = root.need("asset")?.get("minVersion")
+        && least.str()? != "2.0"
+    {
+        return Err(Problem::unsupported(
+            least.path(),
+            format!("the file needs glTF {}, not 2.0", least.str()?),
+            "convert the file to glTF 2.0",
+        ));
+    }
     Ok(())
 }
 

@@ -88,8 +88,21 @@ pub struct Extensions {
     pub used: Vec<String>,
     /// Those without which it must not be read.
     pub required: Vec<String>,
-    /// Those of the used ones that are ignored here.
+    /// Those of the used ones that are not supported here: ignored, or the reason to refuse the
+    /// file if they are required.
     pub ignored: Vec<String>,
+}
+
+/// The extensions of the file at `path`, of which nothing but its JSON need be readable.
+///
+/// # Errors
+/// [`Error::File`](crate::error::Error::File) if it cannot be read,
+/// [`Error::Scene`](crate::error::Error::Scene) if it is no JSON, or its lists are no lists of names.
+pub fn extensions(path: &Path) -> Result<Extensions> {
+    let list = |json| named(&Cursor::root(&json));
+    container::json(path)
+        .and_then(list)
+        .map_err(|p| p.into_error(path))
 }
 
 /// Tells what the file at `path` holds, also if it requires what is not supported.
@@ -132,16 +145,20 @@ fn tell(path: &Path) -> Result<Inventory, Problem> {
         variants,
         materials: root.items("materials")?.iter().map(material).collect(),
         images,
-        extensions: extensions(&root)?,
+        extensions: named(&root)?,
     })
 }
 
-fn extensions(root: &Cursor<'_>) -> Result<Extensions, Problem> {
+fn named(root: &Cursor<'_>) -> Result<Extensions, Problem> {
     let list = |key: &str| -> Result<Vec<String>, Problem> {
         let items = root.items(key)?;
         items.iter().map(|e| e.str().map(str::to_owned)).collect()
     };
-    let (used, required) = (list("extensionsUsed")?, list("extensionsRequired")?);
+    let (mut used, required) = (list("extensionsUsed")?, list("extensionsRequired")?);
+    // What is required must be listed as used, which some files forget.
+    let unlisted = required.iter().filter(|e| !used.contains(*e));
+    let unlisted: Vec<String> = unlisted.cloned().collect();
+    used.extend(unlisted);
     let ignored = used
         .iter()
         .filter(|e| !SUPPORTED.contains(&e.as_str()))

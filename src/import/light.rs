@@ -9,6 +9,7 @@ use crate::color::Rgb;
 use crate::color::units::{self, LightUnits};
 use crate::lights::{LightDesc, SpotCurve};
 use crate::math::{DAffine3, DVec3};
+use crate::scene::SceneBuilder;
 
 /// What our extras say about a punctual light.
 #[derive(Default)]
@@ -28,13 +29,35 @@ pub(super) fn from_blender(root: &Cursor<'_>) -> bool {
         .unwrap_or(false)
 }
 
-/// The units of a file's lights: those asked for, or by who wrote the file.
-pub(super) fn resolve(asked: LightUnits, root: &Cursor<'_>) -> LightUnits {
-    match asked {
-        LightUnits::Auto if from_blender(root) => LightUnits::Blender,
-        LightUnits::Auto => LightUnits::Photometric,
-        chosen => chosen,
+/// The units of what shines in a file: those asked for, or by who wrote it and what is in it.
+/// Tells the user what was chosen for lamps that are there.
+pub(super) fn resolve(
+    asked: LightUnits,
+    root: &Cursor<'_>,
+    builder: &mut SceneBuilder,
+) -> Result<LightUnits, Problem> {
+    if asked != LightUnits::Auto {
+        return Ok(asked);
     }
+    let lamps = match root.extension("KHR_lights_punctual") {
+        Some(e) => !e.items("lights")?.is_empty(),
+        None => false,
+    };
+    let (units, note) = match (from_blender(root), lamps) {
+        (true, _) => (
+            LightUnits::Blender,
+            "lights are taken as Blender exports them: divided by 683, spots by Cycles' curve",
+        ),
+        (false, true) => (
+            LightUnits::Photometric,
+            "lights are taken as candela and lux, emission as cd/m², at 683 lm/W",
+        ),
+        (false, false) => (LightUnits::Radiometric, ""),
+    };
+    if lamps {
+        builder.inform(note);
+    }
+    Ok(units)
 }
 
 /// Reads the light that `at` refers to, for a node that stands at `world`.

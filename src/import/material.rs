@@ -98,6 +98,11 @@ pub(super) fn read<'a>(
     surface_extensions(&mut out, m, &mut slots)?;
     layer_extensions(&mut out, m, &mut slots)?;
     out.unlit = m.extension("KHR_materials_unlit").is_some();
+    if out.unlit {
+        // Its colour is all there is of it; what it emits is for readers without the extension.
+        out.emission = Rgb::ZERO;
+        slots.found.emissive = None;
+    }
     if slots.found.iter().next().is_some() {
         out.textures = Some(Arc::new(slots.found));
     }

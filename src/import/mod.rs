@@ -14,6 +14,7 @@ mod draco;
 mod environment;
 mod extras;
 mod hierarchy;
+mod ignored;
 mod image;
 mod image_based;
 mod implicit;
@@ -29,6 +30,7 @@ mod mesh;
 mod meshopt;
 mod morph;
 mod node;
+mod scenes;
 mod schema;
 mod skin;
 mod solid;
@@ -43,6 +45,7 @@ mod views;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
+use crate::color::units;
 pub use crate::color::units::LightUnits;
 use crate::error::{Error, Result};
 use crate::lights::LightDesc;
@@ -52,7 +55,9 @@ use accessor::Source;
 pub use environment::{EnvironmentOption, EnvironmentSource};
 use hierarchy::Hierarchy;
 use image::Images;
-pub use inventory::{AnimationInfo, Extensions, ImageInfo, Inventory, MaterialInfo, inventory};
+pub use inventory::{
+    AnimationInfo, Extensions, ImageInfo, Inventory, MaterialInfo, extensions, inventory,
+};
 use json::Cursor;
 use node::Walker;
 pub use solid::SolidGlass;
@@ -211,8 +216,11 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
     let mut builder = SceneBuilder::new(plugins);
     builder.leave_out(options.omit);
     let mut notes = Notes::default();
-    let document = container::open(path, |root| check_extensions(root, &mut notes))
+    let mut document = container::open(path, |root| check_extensions(root, &mut notes))
         .map_err(|p| p.into_error(path))?;
+    if scenes::complete(&mut document.json).map_err(|p| p.into_error(path))? {
+        builder.inform("the file has no scenes: all of its nodes are shown");
+    }
     let root = Cursor::root(&document.json);
     let source = Source::new(root.clone(), &document.buffers, document.size);
     let mut images = Images::new(&source, path);
@@ -287,7 +295,7 @@ fn fill<'a>(
     }
     let pose = animation::pose(source, options, notes)?;
     let variant = variants::choose(root, options.variant.as_deref())?;
-    let scene = chosen_scene(root, options)?;
+    let scene = scenes::chosen(root, options, builder)?;
     let roots = scene.items("nodes")?;
     let used = used::materials(root, &roots)?;
     let entries = root.items("materials")?;
@@ -306,13 +314,17 @@ fn fill<'a>(
         SolidGlass::Always => true,
         SolidGlass::Never => false,
     };
+    let light_units = light::resolve(options.light_units, root, builder)?;
+    let radiance = units::radiance_factor(light_units);
     let colored = material::with_vertex_colors(root)?;
     for (i, m) in entries.iter().enumerate() {
         let mut desc = material::read(m, images, notes)?;
+        ignored::tell(m, root, notes)?;
         desc.vertex_colors = colored.contains(&Some(i));
         // Backface culling, which this says of Blender's materials, is for its rasteriser alone:
         // in Cycles surfaces emit from both sides.
         desc.double_sided |= blender;
+        desc.emission *= radiance;
         let id = builder
             .add_material(&desc)
             .map_err(|e| Failure::Plugin(m.path().to_owned(), Box::new(e)))?;
@@ -330,15 +342,6 @@ fn fill<'a>(
             ..Default::default()
         })
         .map_err(|e| Failure::Plugin("the default material".into(), Box::new(e)))?;
-    let light_units = light::resolve(options.light_units, root);
-    if root.extension("KHR_lights_punctual").is_some() && options.light_units == LightUnits::Auto {
-        builder.inform(match light_units {
-            LightUnits::Blender => {
-                "lights are taken as Blender exports them: divided by 683, spots by Cycles' curve"
-            }
-            _ => "lights are taken as candela and lux, at 683 lm/W",
-        });
-    }
     let mut walker = Walker {
         source,
         light_units,
@@ -360,20 +363,21 @@ fn fill<'a>(
              --solid-glass never takes them for thin walls"
         ));
     }
-    if let Some(light) = surroundings(&scene, root, images, path, options, notes)? {
+    if let Some(light) = surroundings(&scene, root, images, path, options, radiance, notes)? {
         builder.add_light(light);
     }
     Ok(())
 }
 
 /// Light from all around: what the user asks for goes before our extras, and these before the
-/// extension.
+/// extension, whose light is multiplied by `radiance`.
 fn surroundings<'a>(
     scene: &Cursor<'a>,
     root: &Cursor<'a>,
     images: &mut Images<'a>,
     path: &Path,
     options: &ImportOptions,
+    radiance: f64,
     notes: &mut Notes,
 ) -> Result<Option<LightDesc>, Failure> {
     let extras = environment::of_scene(scene, path, notes)?;
@@ -383,7 +387,11 @@ fn surroundings<'a>(
             .map(Some)
             .map_err(|e| Failure::Plugin(scene.path().to_owned(), Box::new(e)));
     }
-    Ok(image_based::of_scene(scene, root, images, notes)?)
+    let mut light = image_based::of_scene(scene, root, images, notes)?;
+    if let Some(light) = &mut light {
+        light.strength *= radiance;
+    }
+    Ok(light)
 }
 
 fn check_extensions(root: &Cursor<'_>, notes: &mut Notes) -> Result<(), Problem> {
@@ -404,34 +412,4 @@ fn check_extensions(root: &Cursor<'_>, notes: &mut Notes) -> Result<(), Problem>
         }
     }
     Ok(())
-}
-
-/// The scene that is rendered.
-fn chosen_scene<'a>(root: &Cursor<'a>, options: &ImportOptions) -> Result<Cursor<'a>, Problem> {
-    let scenes = root.items("scenes")?;
-    let chosen = match &options.scene {
-        Some(name) => {
-            let named = |s: &&Cursor<'_>| s.get("name").is_some_and(|n| n.value() == name.as_str());
-            Some(scenes.iter().find(named).cloned().ok_or_else(|| {
-                let known: Vec<String> = scenes.iter().map(Cursor::name).collect();
-                Problem {
-                    remedy: format!("known scenes: {}", known.join(", ")),
-                    ..Problem::invalid("/scenes", format!("none is named '{name}'"))
-                }
-            })?)
-        }
-        None => match root.get("scene") {
-            Some(at) => Some(
-                scenes
-                    .get(at.index()?)
-                    .cloned()
-                    .ok_or_else(|| at.problem("names a scene that does not exist"))?,
-            ),
-            None => scenes.first().cloned(),
-        },
-    };
-    chosen.ok_or_else(|| Problem {
-        remedy: "export the file with a scene".into(),
-        ..Problem::invalid("/scenes", "the file holds no scene")
-    })
 }

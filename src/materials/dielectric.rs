@@ -1,8 +1,10 @@
 //! `dielectric`: clear glass, smooth or rough, solid or thin-walled. In glTF: metallic 0,
 //! transmission 1; solid with `KHR_materials_volume`, thin-walled without.
 
+use super::filmed::FacetFilm;
 use super::lobes::{GgxDielectric, Lobe, SmoothDielectric, ThinDielectric, ThinGgx};
 use super::microfacet::Ggx;
+use super::thin_film::ThinFilm;
 use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
 use crate::geometry::Surface;
@@ -21,6 +23,8 @@ pub(super) struct Interface {
     pub(super) ggx: Ggx,
     pub(super) smooth: bool,
     pub(super) thin: bool,
+    /// A film, and the share of the interface that it covers.
+    pub(super) film: Option<(ThinFilm, f64)>,
 }
 
 impl Interface {
@@ -41,6 +45,7 @@ impl Interface {
             // Index 1 bends nothing, however rough: a delta that light sampling leaves alone.
             smooth: d.is_smooth() || (d.ior == 1.0 && d.volume),
             thin: !d.volume,
+            film: None,
         })
     }
 
@@ -72,12 +77,18 @@ impl Interface {
         let Self {
             tint, reflect, ggx, ..
         } = *self;
+        // Both faces of a pane are outside.
+        let outside = front || self.thin;
+        let film = self
+            .film
+            .map(|(film, strength)| FacetFilm::new(&film, strength, outside));
         if self.thin {
             let facet = ThinDielectric {
                 eta: ior,
                 tint,
                 reflect,
                 share,
+                film,
             };
             return if self.smooth {
                 facet.into()
@@ -90,6 +101,7 @@ impl Interface {
             tint,
             reflect,
             share,
+            film,
         };
         if self.smooth {
             facet.into()

@@ -46,6 +46,12 @@ pub fn dielectric(cos_i: f64, eta: f64) -> Dielectric {
     }
 }
 
+/// Reflectance at normal incidence between two indices of refraction.
+#[inline]
+pub fn f0(a: f64, b: f64) -> f64 {
+    ((a - b) / (a + b)).powi(2)
+}
+
 /// Reflected and transmitted colour of an interface that reflects `reflect` of what Fresnel says
 /// and colours what it transmits by `tint`. What is not reflected is transmitted, and under total
 /// internal reflection nothing is.
@@ -90,16 +96,43 @@ pub enum Fresnel {
     /// A plain surface.
     Schlick(Schlick),
     /// A thin film on part of it (`KHR_materials_iridescence`).
-    Film {
-        /// The surface.
-        base: Schlick,
-        /// The film.
-        film: ThinFilm,
-        /// Share of the film.
-        strength: f64,
-        /// What `base` is scaled by.
-        share: f64,
-    },
+    Film(Film),
+}
+
+/// A thin film on part of a surface that is metal and dielectric side by side. What a film
+/// reflects is not linear in what it lies on, so that both are asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Film {
+    /// The film.
+    pub film: ThinFilm,
+    /// Share of the surface that it covers.
+    pub strength: f64,
+    /// Reflectance of the metal at normal incidence.
+    pub metal: Rgb,
+    /// Share of the metal.
+    pub metallic: f64,
+    /// The dielectric.
+    pub dielectric: Schlick,
+    /// Share of the dielectric.
+    pub opaque: f64,
+}
+
+impl Film {
+    fn at(&self, cos: f64) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        if self.metallic > 0.0 {
+            sum += self.on(schlick(self.metal, 1.0, cos), self.metal, cos) * self.metallic;
+        }
+        if self.opaque > 0.0 {
+            sum += self.on(self.dielectric.at(cos), self.dielectric.f0, cos) * self.opaque;
+        }
+        sum
+    }
+
+    /// The film on what reflects `bare` without it.
+    fn on(&self, bare: Rgb, f0: Rgb, cos: f64) -> Rgb {
+        bare * (1.0 - self.strength) + self.film.reflectance(cos, f0) * self.strength
+    }
 }
 
 impl From<Schlick> for Fresnel {
@@ -115,15 +148,7 @@ impl Fresnel {
     pub fn at(&self, cos: f64) -> Rgb {
         match self {
             Self::Schlick(s) => s.at(cos),
-            Self::Film {
-                base,
-                film,
-                strength,
-                share,
-            } => {
-                let bare = base.f0 / share.max(f64::MIN_POSITIVE);
-                base.at(cos) * (1.0 - strength) + film.reflectance(cos, bare) * (strength * share)
-            }
+            Self::Film(film) => film.at(cos),
         }
     }
 }

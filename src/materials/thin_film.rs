@@ -5,6 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::fresnel::f0;
 use crate::color::Rgb;
 
 /// A film on a surface, in air.
@@ -14,11 +15,6 @@ pub struct ThinFilm {
     pub ior: f64,
     /// Thickness in nanometres.
     pub thickness: f64,
-}
-
-/// Reflectance at normal incidence between two indices.
-fn f0(to: f64, from: f64) -> f64 {
-    ((to - from) / (to + from)).powi(2)
 }
 
 fn schlick(f0: f64, cos: f64) -> f64 {
@@ -52,12 +48,17 @@ fn sensitivity(path: f64, shift: [f64; 3]) -> [f64; 3] {
 }
 
 impl ThinFilm {
+    /// From 0 where there is no film to 1 where it is thick enough to be one.
+    pub(super) fn presence(&self) -> f64 {
+        let x = (self.thickness / 0.03).clamp(0.0, 1.0);
+        x * x * (3.0 - 2.0 * x)
+    }
+
     /// Reflectance of the film on a base of reflectance `base` at normal incidence.
     pub fn reflectance(&self, cos: f64, base: Rgb) -> Rgb {
         let cos = cos.clamp(0.0, 1.0);
         // As the film vanishes its index becomes that of air.
-        let x = (self.thickness / 0.03).clamp(0.0, 1.0);
-        let ior = 1.0 + (self.ior - 1.0) * (x * x * (3.0 - 2.0 * x));
+        let ior = 1.0 + (self.ior - 1.0) * self.presence();
         let sin2 = (1.0 - cos * cos) / (ior * ior);
         if sin2 >= 1.0 {
             return Rgb::ONE;

@@ -4,7 +4,7 @@ use super::Bsdf;
 use super::bsdf::FrameId;
 use super::cover::Cover;
 use super::dielectric::Interface;
-use super::fresnel::{Fresnel, Schlick};
+use super::fresnel::{Film, Fresnel, Schlick, f0};
 use super::layer::LayerAlbedo;
 use super::lobes::{
     CoatedLambert, DiffuseTransmission, GgxReflection, Lambert, Lobe, Sheen, SmoothReflection,
@@ -84,7 +84,7 @@ impl Values {
         let r = if self.ior == 0.0 {
             1.0
         } else {
-            ((self.ior - 1.0) / (self.ior + 1.0)).powi(2)
+            f0(self.ior, 1.0)
         };
         Schlick {
             f0: (self.specular_color * r).map(|c| c.min(1.0)) * self.specular,
@@ -103,11 +103,23 @@ impl Values {
             // Index 1 bends nothing, however rough: a delta that light sampling leaves alone.
             smooth: self.is_smooth() || (self.ior == 1.0 && self.volume),
             thin: !self.volume,
+            film: self.film(),
         }
     }
 
     fn is_smooth(&self) -> bool {
         self.roughness < MaterialDesc::SMOOTH
+    }
+
+    /// The thin film, and the share of the surface that it covers. A film too thin to be one
+    /// covers nothing: the model of interference would leave the grazing terms of both its faces.
+    fn film(&self) -> Option<(ThinFilm, f64)> {
+        let film = ThinFilm {
+            ior: self.iridescence_ior,
+            thickness: self.iridescence_thickness,
+        };
+        let strength = self.iridescence * film.presence();
+        (strength > 0.0).then_some((film, strength))
     }
 
     /// The microfacet distribution (`KHR_materials_anisotropy` widens it along the tangent).
@@ -125,10 +137,7 @@ impl Values {
         let through = dielectric * self.transmission;
         let opaque = dielectric - through;
         let layer = self.dielectric_layer();
-        let film = (self.iridescence > 0.0).then_some(ThinFilm {
-            ior: self.iridescence_ior,
-            thickness: self.iridescence_thickness,
-        });
+        let film = self.film();
 
         if opaque > 0.0 {
             let mut base = self.base_color * opaque;
@@ -160,15 +169,14 @@ impl Values {
         };
         let fresnel = match film {
             None => Fresnel::Schlick(schlick),
-            Some(film) => {
-                let share = self.metallic + opaque;
-                Fresnel::Film {
-                    base: schlick,
-                    film,
-                    strength: self.iridescence,
-                    share,
-                }
-            }
+            Some((film, strength)) => Fresnel::Film(Film {
+                film,
+                strength,
+                metal: self.base_color,
+                metallic: self.metallic,
+                dielectric: layer,
+                opaque,
+            }),
         };
         bsdf.push(reflection(self.is_smooth(), self.ggx(), fresnel));
 
@@ -178,7 +186,7 @@ impl Values {
             bsdf.push(sheen);
         }
         if self.clearcoat > 0.0 {
-            let r = ((COAT_IOR - 1.0) / (COAT_IOR + 1.0)).powi(2);
+            let r = f0(COAT_IOR, 1.0);
             let fresnel = Schlick {
                 f0: Rgb::splat(r * self.clearcoat),
                 f90: self.clearcoat,
@@ -193,15 +201,17 @@ impl Values {
     }
 
     /// What the reflecting layer above the diffuse base sends back, largest channel.
-    fn layer_albedo(&self, layer: &Schlick, film: Option<&ThinFilm>) -> LayerAlbedo {
-        let f0 = match film {
-            None => layer.f0.max_channel(),
-            Some(film) => {
-                let bare = layer.f0.max_channel() * (1.0 - self.iridescence);
-                bare + film.bound(layer.f0) * self.iridescence
+    fn layer_albedo(&self, layer: &Schlick, film: Option<&(ThinFilm, f64)>) -> LayerAlbedo {
+        let (f0, f90) = match film {
+            None => (layer.f0.max_channel(), layer.f90),
+            Some((film, strength)) => {
+                let mix = |bare: f64, filmed: f64| bare * (1.0 - strength) + filmed * strength;
+                // A film reflects everything at grazing angles, however weak the base is.
+                let f0 = mix(layer.f0.max_channel(), film.bound(layer.f0));
+                (f0, mix(layer.f90, 1.0))
             }
         };
-        LayerAlbedo::new(self.roughness, f0.min(1.0), layer.f90.max(f0.min(1.0)), 1.0)
+        LayerAlbedo::new(self.roughness, f0.min(1.0), f90.max(f0.min(1.0)), 1.0)
     }
 
     /// Of a material whose values lie between `low` and `high`: what it may do anywhere.

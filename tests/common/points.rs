@@ -197,7 +197,17 @@ pub fn specimens(roughnesses: &[f64]) -> Vec<Specimen> {
                             },
                         ),
                     ];
-                    for (what, desc) in through {
+                    let filmed = |volume| MaterialDesc {
+                        transmission: 1.0,
+                        volume,
+                        iridescence: 0.8,
+                        ..plastic()
+                    };
+                    let filmed = [
+                        ("filmed glass", filmed(true)),
+                        ("filmed pane", filmed(false)),
+                    ];
+                    for (what, desc) in through.into_iter().chain(filmed) {
                         add(&format!("{what}, roughness {r}"), true, desc);
                     }
                 }

@@ -29,7 +29,7 @@ impl GgxDielectric {
     #[inline]
     fn facet(&self, cos: f64) -> Facet {
         let f = fresnel::dielectric(cos, self.facet.eta);
-        let [reflected, refracted] = self.facet.split(&f);
+        let [reflected, refracted] = self.facet.split(&f, cos);
         let (r, t) = (reflected.max_channel(), refracted.max_channel());
         Facet {
             p_reflect: if r > 0.0 { r / (r + t) } else { 0.0 },

@@ -99,6 +99,7 @@ impl Lobe {
                 tint: Rgb::ONE,
                 reflect: Rgb::ZERO,
                 share: facet.share,
+                film: None,
             }
             .into();
             return;

@@ -2,6 +2,7 @@
 
 use super::{Branches, LobeClass, LobeModel, LobeSample, pick};
 use crate::color::Rgb;
+use crate::materials::filmed::FacetFilm;
 use crate::materials::fresnel;
 use crate::math::{DVec3, nearly_unit};
 
@@ -16,13 +17,23 @@ pub struct SmoothDielectric {
     pub reflect: Rgb,
     /// Share of the surface that is this interface, by channel; the rest is left to other lobes.
     pub share: Rgb,
+    /// A film on it.
+    pub film: Option<FacetFilm>,
 }
 
 impl SmoothDielectric {
-    /// What is reflected and refracted.
+    /// What is reflected and refracted at the cosine for which Fresnel's equations gave `f`.
     #[inline]
-    pub(super) fn split(&self, f: &fresnel::Dielectric) -> [Rgb; 2] {
-        fresnel::split(f, self.reflect, self.tint).map(|c| c * self.share)
+    pub(super) fn split(&self, f: &fresnel::Dielectric, cos: f64) -> [Rgb; 2] {
+        let bare = fresnel::split(f, self.reflect, self.tint);
+        let sides = match &self.film {
+            Some(film) if f.cos_t > 0.0 => {
+                let reflectance = film.reflectance(f, cos, self.eta, self.reflect);
+                film.over(bare, reflectance, self.tint)
+            }
+            _ => bare,
+        };
+        sides.map(|c| c * self.share)
     }
 }
 
@@ -45,7 +56,7 @@ impl LobeModel for SmoothDielectric {
     #[inline]
     fn branches(&self, wo: DVec3) -> Branches {
         let f = fresnel::dielectric(wo.z, self.eta);
-        let [reflected, refracted] = self.split(&f);
+        let [reflected, refracted] = self.split(&f, wo.z);
         let mut out = Branches::new();
         out.push(LobeSample {
             wi: DVec3::new(-wo.x, -wo.y, wo.z),
@@ -65,14 +76,18 @@ impl LobeModel for SmoothDielectric {
 
     #[inline]
     fn albedo(&self, wo: DVec3) -> Rgb {
-        let [reflected, refracted] = self.split(&fresnel::dielectric(wo.z, self.eta));
+        let [reflected, refracted] = self.split(&fresnel::dielectric(wo.z, self.eta), wo.z);
         reflected + refracted
     }
 
     #[inline]
     fn importance(&self, _wo: DVec3) -> f64 {
         // What Fresnel's equations part is whole: no need to solve them for this.
-        (self.share * (self.reflect.max_channel().max(self.tint.max_channel()))).max_channel()
+        let most = match self.film {
+            None => self.reflect.max_channel().max(self.tint.max_channel()),
+            Some(_) => 1.0,
+        };
+        (self.share * most).max_channel()
     }
 
     #[inline]

@@ -2,6 +2,7 @@
 
 use super::{Branches, LobeClass, LobeModel, LobeSample, pick};
 use crate::color::Rgb;
+use crate::materials::filmed::FacetFilm;
 use crate::materials::fresnel;
 use crate::math::DVec3;
 
@@ -17,6 +18,8 @@ pub struct ThinDielectric {
     pub reflect: Rgb,
     /// Share of the surface that is this pane; the rest is left to other lobes.
     pub share: Rgb,
+    /// A film on both of its faces.
+    pub film: Option<FacetFilm>,
 }
 
 impl ThinDielectric {
@@ -30,7 +33,15 @@ impl ThinDielectric {
             transmittance: f.transmittance / sum,
             cos_t: 1.0,
         };
-        fresnel::split(&pane, self.reflect, self.tint).map(|c| c * self.share)
+        let bare = fresnel::split(&pane, self.reflect, self.tint);
+        let sides = match &self.film {
+            None => bare,
+            Some(film) => {
+                let face = film.reflectance(&f, cos, self.eta, self.reflect);
+                film.over(bare, face.map(|r| 2.0 * r / (1.0 + r)), self.tint)
+            }
+        };
+        sides.map(|c| c * self.share)
     }
 }
 

@@ -127,7 +127,7 @@ fn measure(
             if control.stopped().is_some() {
                 return Ok(None);
             }
-            let settings = settings(&scene, backend, options);
+            let settings = settings(backend, options);
             let first = RenderSettings {
                 integrator: Some("path".into()),
                 spp: 1,
@@ -157,7 +157,7 @@ fn measure(
         .iter()
         .map(|b| build(&scene, b, registry))
         .collect::<Result<_>>()?;
-    let settings = settings(&scene, "", options);
+    let settings = settings("", options);
     let camera = pipeline::choose_camera(&scene, &settings, registry)?;
     let judge = accels.first();
     let sets = Order::ALL.map(|order| {
@@ -221,12 +221,11 @@ fn build(scene: &Scene, backend: &str, registry: &Registry) -> Result<Box<dyn Ac
 }
 
 /// A small picture that goes through every stage.
-fn settings(scene: &Scene, backend: &str, options: &BenchOptions) -> RenderSettings {
+fn settings(backend: &str, options: &BenchOptions) -> RenderSettings {
     let mut s = RenderSettings {
         accelerator: Some(backend.into()),
         integrator: Some("photon".into()),
         effects: "all".into(),
-        camera: scene.cameras.is_empty().then(|| "auto".into()),
         width: options.size,
         height: options.size,
         spp: 4,
