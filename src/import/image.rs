@@ -23,6 +23,10 @@ use crate::textures::{Image, Texels};
 /// Most texels of one image: 16384 × 16384.
 const MAX_TEXELS: u64 = 1 << 28;
 
+/// Longest side of an image, four times that of the largest square. Smaller sizes are made by rows,
+/// of which a few are in memory at a time.
+const MAX_SIDE: u32 = 1 << 16;
+
 /// Most bytes of all decoded images together. A few kilobytes of a well-packed file can claim
 /// gigabytes, so the headers are added up before anything is decoded.
 const MAX_BYTES: u64 = 1 << 33;
@@ -241,6 +245,13 @@ fn claim(
         return Err(Problem::unsupported(
             place.path(),
             format!("is an image of {width} × {height} texels, more than {MAX_TEXELS}"),
+            "make it smaller",
+        ));
+    }
+    if width.max(height) > MAX_SIDE {
+        return Err(Problem::unsupported(
+            place.path(),
+            format!("is an image of {width} × {height} texels, a side longer than {MAX_SIDE}"),
             "make it smaller",
         ));
     }

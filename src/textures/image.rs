@@ -138,9 +138,10 @@ impl Image {
         }
     }
 
-    /// Memory of the texels in bytes.
+    /// Memory of the texels and of the smaller sizes that are there, in bytes.
     pub fn bytes(&self) -> usize {
-        self.texels.bytes()
+        let pyramids = self.pyramids.iter().filter_map(OnceLock::get);
+        self.texels.bytes() + pyramids.map(Pyramid::bytes).sum::<usize>()
     }
 
     /// The texel in column `x` of row `y`, both within the image: linear red, green, blue and
@@ -258,7 +259,7 @@ impl Image {
 
 /// The four numbers of texel `i`: grey is all colours, and what has no alpha is whole.
 #[inline]
-fn expand<T: Copy>(
+pub(super) fn expand<T: Copy>(
     v: &[T],
     i: usize,
     channels: usize,
