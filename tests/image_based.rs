@@ -192,6 +192,12 @@ fn what_is_wrong_is_told_with_its_place() {
         &format!("{at}/specularImages/0/0"),
         "16 × 16 texels",
     );
+    // Before anything is decoded: the images are smaller.
+    case(
+        &|a| light(a)["specularImageSize"] = json!(5000),
+        &format!("{at}/specularImageSize"),
+        "more than 4096",
+    );
     case(
         &|a| light(a)["irradianceCoefficients"] = json!([[0, 0, 0]]),
         &format!("{at}/irradianceCoefficients"),

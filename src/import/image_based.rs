@@ -19,6 +19,10 @@ pub(super) const NAME: &str = "EXT_lights_image_based";
 /// The first spherical harmonic, √(1/4π), which is the same everywhere.
 const Y00: f64 = 0.282_094_791_773_878_14;
 
+/// Most texels along an edge of the cube: its faces become floating point, 1.2 GB for these, even if
+/// one flat image of a few kilobytes is all six.
+const MOST: usize = 4096;
+
 /// How far the irradiance may be from that of the images before the user is told: they are of
 /// 8 bits, and exporters integrate coarsely.
 const ALIKE: f64 = 0.1;
@@ -46,6 +50,14 @@ fn faces<'a>(
     images: &mut Images<'a>,
     notes: &mut Notes,
 ) -> Result<Option<Vec<(Cursor<'a>, Arc<Image>)>>, Problem> {
+    let size = light.need("specularImageSize")?;
+    if size.index()? > MOST {
+        return Err(Problem::unsupported(
+            size.path(),
+            format!("a cube of more than {MOST} texels along its edges takes gigabytes"),
+            "make it smaller",
+        ));
+    }
     let sizes = light.need("specularImages")?;
     let sharp = sizes
         .elements()?

@@ -64,7 +64,8 @@ impl CubeMap {
         // Texels of the cube shrink towards its corners.
         let fine = 2 * (4 * u64::from(self.size)).div_ceil(u64::from(width)) as u32;
         let share = 1.0 / f64::from(fine * fine);
-        let row = |y: u32| -> Vec<[f32; 3]> {
+        let row = |(y, row): (usize, &mut [[f32; 3]])| {
+            let y = y as u32;
             let texel = |x: u32| {
                 let mut sum = [0.0; 3];
                 for k in 0..fine * fine {
@@ -78,10 +79,16 @@ impl CubeMap {
                 }
                 sum.map(|s| s as f32)
             };
-            (0..width).map(texel).collect()
+            for (x, out) in (0..width).zip(row) {
+                *out = texel(x);
+            }
         };
-        let rows: Vec<_> = (0..height).into_par_iter().map(row).collect();
-        SkyImage::new(width, height, rows.concat())
+        let mut texels = vec![[0.0; 3]; width as usize * height as usize];
+        texels
+            .par_chunks_mut(width.max(1) as usize)
+            .enumerate()
+            .for_each(row);
+        SkyImage::new(width, height, texels)
     }
 
     /// Radiance from a direction, blended between texels.
