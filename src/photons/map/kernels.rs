@@ -45,6 +45,13 @@ impl<'a> Kernel<'a> {
     pub(super) fn plane(&self) -> Option<Plane<'a>> {
         self.plane.map(|(c, p, ng)| Plane::new(c, p, ng))
     }
+
+    /// The surface whose tangent plane the kernel's area is measured in, if that is not the one
+    /// of the site where it serves.
+    #[inline]
+    pub(super) fn ground(&self) -> Option<Side> {
+        self.plane.map(|(_, p, ng)| Side::new(&Site { p, ng }))
+    }
 }
 
 /// What was decided at a site.

@@ -87,6 +87,24 @@ impl Side {
             // Where surfaces are flat nothing needs to be unpacked.
             && (n == self.packed || n.unpack().dot(self.ng) >= NORMAL_AGREEMENT)
     }
+
+    /// Whether `q` lies over the disc of squared radius `r2` around `center` in the tangent plane.
+    #[inline]
+    fn over(&self, center: Vec3, q: Vec3, r2: f32) -> bool {
+        let way = q - center;
+        let height = way.dot(self.ng);
+        way.length_squared() - height * height <= r2
+    }
+
+    /// What the area of a surface with normal `n` has of its size in the tangent plane.
+    #[inline]
+    fn seen(&self, n: PackedNormal) -> f64 {
+        if n == self.packed {
+            1.0
+        } else {
+            f64::from(n.unpack().dot(self.ng)).clamp(0.0, 1.0)
+        }
+    }
 }
 
 /// Photons in a tree.
@@ -198,6 +216,11 @@ impl PhotonMap {
     }
 
     /// As [`estimate`](Self::estimate), over all photons of a given kernel.
+    ///
+    /// A kernel's area is that of a disc in a plane, and photons count that lie over it, close to
+    /// the plane. On what is tilted against it, where the surface bends, they lie closer together
+    /// over the disc than on the surface, and count by so much less. Close to an edge the plane is
+    /// perhaps that of the surface beyond, on which photons count as well as on this one.
     #[inline]
     pub fn estimate_within(
         &self,
@@ -210,16 +233,23 @@ impl PhotonMap {
         let r = f64::from(kernel.radius);
         let disc = PI * r * r;
         let (mut sum, mut counted) = (Rgb::ZERO, 0u32);
-        let mut search = Within(kernel.radius * kernel.radius, |i: usize| {
+        let side = Side::new(site);
+        let ground = kernel.ground();
+        let flat = ground.as_ref().unwrap_or(&side);
+        let r2 = kernel.radius * kernel.radius;
+        // What lies over the rim, as high as it may.
+        let reach2 = r2 * (1.0 + FLATNESS * FLATNESS);
+        let mut search = Within(reach2, |i: usize| {
             let photon = &self.photons[i];
-            sum += f(photon.wi()) * photon.power();
+            sum += f(photon.wi()) * photon.power() * flat.seen(photon.packed_ng());
             counted += 1;
         });
-        let side = Side::new(site);
-        self.tree.visit_near(site.p, &mut search, |i, p, r2| {
+        self.tree.visit_near(site.p, &mut search, |i, p, _| {
             let photon = &self.photons[i];
+            let on = |s: &Side| s.accepts(p, photon.packed_ng(), r2);
             keep(photon.class)
-                && side.accepts(p, photon.packed_ng(), r2)
+                && flat.over(site.p, p, r2)
+                && (on(&side) || ground.as_ref().is_some_and(on))
                 && plane.as_ref().is_none_or(|c| c.contains(p))
         });
         if counted == 0 {
