@@ -99,6 +99,36 @@ struct Deferred {
     offset: [f32; 3],
 }
 
+/// How far from their positions items are wanted at all, at most: for every range of the tree.
+#[derive(Debug, Default)]
+pub struct Limits {
+    /// Squared, of the range that is split before block `i`.
+    ranges: Vec<f32>,
+    /// Squared, of block `i`.
+    blocks: Vec<f32>,
+}
+
+impl Limits {
+    #[inline]
+    fn of(&self, at: &Deferred) -> f32 {
+        if at.hi - at.lo > 1 {
+            self.ranges[at.lo.midpoint(at.hi) as usize]
+        } else {
+            self.blocks[at.lo as usize]
+        }
+    }
+
+    fn fill(&mut self, lo: u32, hi: u32) -> f32 {
+        if hi - lo <= 1 {
+            return self.blocks[lo as usize];
+        }
+        let mid = lo.midpoint(hi);
+        let most = self.fill(lo, mid).max(self.fill(mid, hi));
+        self.ranges[mid as usize] = most;
+        most
+    }
+}
+
 /// The tree over a slice of items that it has sorted.
 #[derive(Debug, Default)]
 pub struct KdTree {
@@ -140,6 +170,46 @@ impl KdTree {
         found: &mut impl Search,
         accept: impl Fn(usize, Vec3, f32) -> bool,
     ) {
+        self.visit(p, found, accept, |_| f32::INFINITY);
+    }
+
+    /// As [`visit_near`](Self::visit_near), for an `accept` that takes no item beyond its limit:
+    /// what is too far for all of its items is not looked at.
+    #[inline]
+    pub fn visit_wanted(
+        &self,
+        p: Vec3,
+        limits: &Limits,
+        found: &mut impl Search,
+        accept: impl Fn(usize, Vec3, f32) -> bool,
+    ) {
+        self.visit(p, found, accept, |at| limits.of(at));
+    }
+
+    /// The limits of ranges by the squared ones of items.
+    pub fn limits(&self, squared: impl Fn(usize) -> f32, items: usize) -> Limits {
+        let all: Vec<f32> = (0..items).map(squared).collect();
+        let mut out = Limits {
+            ranges: vec![0.0; self.blocks.len()],
+            blocks: all
+                .chunks(WIDTH)
+                .map(|c| c.iter().copied().fold(0.0, f32::max))
+                .collect(),
+        };
+        if !self.blocks.is_empty() {
+            out.fill(0, self.blocks.len() as u32);
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn visit(
+        &self,
+        p: Vec3,
+        found: &mut impl Search,
+        accept: impl Fn(usize, Vec3, f32) -> bool,
+        limit: impl Fn(&Deferred) -> f32,
+    ) {
         if self.blocks.is_empty() {
             return;
         }
@@ -174,15 +244,21 @@ impl KdTree {
                     stack[top] = far;
                     top += 1;
                 }
+                if squared(at.offset) > limit(&at) {
+                    break;
+                }
             }
-            self.offer(at.lo as usize, p, found, &accept);
+            if at.hi - at.lo == 1 && squared(at.offset) <= limit(&at) {
+                self.offer(at.lo as usize, p, found, &accept);
+            }
             loop {
                 if top == 0 {
                     return;
                 }
                 top -= 1;
                 at = stack[top];
-                if squared(at.offset) < found.bound() {
+                let near = squared(at.offset);
+                if near < found.bound() && near <= limit(&at) {
                     break;
                 }
             }
@@ -320,5 +396,35 @@ mod tests {
         found.reset(50, 1.0);
         tree.visit_near(Vec3::splat(0.5), &mut found, |_, _, _| true);
         assert_eq!((found.len(), found.kernel().1), (50, 0.0));
+    }
+
+    #[test]
+    fn limits_leave_out_nothing_that_is_wanted() {
+        let mut rng = Rng::new(6);
+        for n in [1usize, 8, 9, 1000] {
+            let mut items: Vec<([f32; 3], f32)> = (0..n)
+                .map(|_| {
+                    let p = [0; 3].map(|_| rng.next_1d() as f32);
+                    // Most reach a little way, a few far.
+                    (p, (rng.next_1d() as f32).powi(8))
+                })
+                .collect();
+            let tree = KdTree::build(&mut items, |i| i.0);
+            let limits = tree.limits(|i| items[i].1, n);
+            for _ in 0..200 {
+                let q = Vec3::from([0; 3].map(|_| 1.4 * rng.next_1d() as f32 - 0.2));
+                let wanted = |i: usize, p: Vec3| q.distance_squared(p) <= items[i].1;
+                let mut got = Vec::new();
+                let looked = std::cell::Cell::new(0);
+                tree.visit_wanted(q, &limits, &mut Within(4.0, |i| got.push(i)), |i, p, _| {
+                    looked.set(looked.get() + 1);
+                    wanted(i, p)
+                });
+                got.sort_unstable();
+                let all = (0..n).filter(|i| wanted(*i, items[*i].0.into()));
+                assert_eq!(got, all.collect::<Vec<_>>());
+                assert!(n < 1000 || looked.get() < n);
+            }
+        }
     }
 }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::clearing::{Clearing, Plane, Surroundings};
 use super::nearest::Closest;
-use super::{KdTree, Nearest, PackedNormal, PhotonMap, Side, Site};
+use super::{KdTree, Limits, Nearest, PackedNormal, PhotonMap, Side, Site};
 use crate::control::Control;
 use crate::math::Vec3;
 use crate::photons::PhotonClass;
@@ -65,11 +65,30 @@ struct Decision {
 
 const OPEN: u32 = u32::MAX;
 
+/// How far from its site a kernel with a clearing may serve, in radii: its corners lie within
+/// twice the radius, and no point is as high above as it is far.
+const FARTHEST: f32 = 2.0 * std::f32::consts::SQRT_2;
+
+impl Decision {
+    /// Squared distance from the site up to which the kernel may serve.
+    #[inline]
+    fn limit(&self) -> f32 {
+        let reach = if self.clearing == OPEN {
+            self.radius
+        } else {
+            FARTHEST * self.radius
+        };
+        reach * reach
+    }
+}
+
 /// The kernels of a map.
 #[derive(Debug, Default)]
 pub struct Kernels {
     /// Where kernels were decided: the tree has the positions.
     tree: KdTree,
+    /// How far they may serve.
+    limits: Limits,
     decisions: Vec<Decision>,
     clearings: Vec<Clearing>,
     /// The radius where no pilot photon came.
@@ -147,8 +166,10 @@ impl Pilot<'_> {
                 (p, decision)
             })
             .collect();
+        let tree = KdTree::build(&mut sites, |s| s.0.into());
         Kernels {
-            tree: KdTree::build(&mut sites, |s| s.0.into()),
+            limits: tree.limits(|i| sites[i].1.limit(), sites.len()),
+            tree,
             decisions: sites.into_iter().map(|s| s.1).collect(),
             clearings,
             widest,
@@ -196,17 +217,21 @@ impl Kernels {
         [0.25, 1.0].into_iter().find_map(|reach| {
             let r = self.widest * reach;
             let mut found = Closest::new(r * r);
-            self.tree.visit_near(site.p, &mut found, |i, p, _| {
+            // Where sites lie close beside what is large, thousands of them are near that do not
+            // serve here.
+            let wanted = |i: usize, p: Vec3, _: f32| {
                 let d = &self.decisions[i];
-                side.accepts(p, d.ng, r * r)
-                    && if d.clearing == OPEN {
-                        // Twice the radius is open, so that all of a kernel here is, too.
-                        site.p.distance_squared(p) <= d.radius * d.radius
-                    } else {
-                        let plane = self.at(i).plane();
-                        plane.is_some_and(|plane| plane.contains(site.p))
-                    }
-            });
+                // Twice the radius is open, so that all of a kernel here is, too.
+                site.p.distance_squared(p) <= d.limit()
+                    && side.accepts(p, d.ng, r * r)
+                    && (d.clearing == OPEN
+                        || self
+                            .at(i)
+                            .plane()
+                            .is_some_and(|plane| plane.contains(site.p)))
+            };
+            self.tree
+                .visit_wanted(site.p, &self.limits, &mut found, wanted);
             found.item.map(|i| i as usize)
         })
     }

@@ -8,7 +8,7 @@ mod nearest;
 
 pub use clearing::Surroundings;
 pub use irradiance::{IrradianceMap, IrradianceSample};
-pub use kdtree::{KdTree, Search, Within};
+pub use kdtree::{KdTree, Limits, Search, Within};
 pub use kernels::{Kernel, Kernels, Pilot};
 pub use nearest::Nearest;
 
