@@ -117,10 +117,10 @@ impl DirectSample {
 /// Picks a light by flux and a point on it. `n_light` of these are taken against `n_bsdf`
 /// samples of the BSDF, whose hits on the light weigh against these; 0 if there are none.
 #[inline(always)]
-pub(super) fn sample_direct(
+pub(super) fn sample_direct<S: Scattering>(
     cx: &RenderContext<'_>,
     sp: &SurfacePoint,
-    bsdf: &impl Scattering,
+    bsdf: &S,
     u: [f64; 2],
     n_light: f64,
     n_bsdf: f64,
@@ -135,11 +135,13 @@ pub(super) fn sample_direct(
         let y = if alone { 0.0 } else { pdf_lobe * n_bsdf };
         x / (x * x + y * y)
     });
-    if value.diffuse.is_black() && value.glossy.is_black() {
+    if value.diffuse.is_black() && (!S::GLOSSY || value.glossy.is_black()) {
         return None;
     }
     value.diffuse *= li.radiance;
-    value.glossy *= li.radiance;
+    if S::GLOSSY {
+        value.glossy *= li.radiance;
+    }
     Some(DirectSample {
         value,
         ray: sp.spawn_toward(li.wi, li.target),

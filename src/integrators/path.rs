@@ -301,13 +301,13 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
     /// Asks for light from elsewhere, and turns the path into a new direction. Whether it goes
     /// on.
     #[inline(always)]
-    fn turn(
+    fn turn<S: Scattering>(
         &self,
         depth: u32,
         w: &mut Walker,
         sp: &SurfacePoint,
         trail: &Trail,
-        bsdf: &impl Scattering,
+        bsdf: &S,
         lights: &mut ArrayVec<Direct, BATCH>,
     ) -> bool {
         let cx = &self.cx;
@@ -318,12 +318,16 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
             let u = w.sampler.next_2d();
             if let Some(mut direct) = sample_direct(cx, sp, bsdf, u, 1.0, 1.0) {
                 let dropped = PHOTONS && w.left_diffuse > 0;
-                if dropped || !direct.follows_glossy(cx, sp) {
+                if S::GLOSSY && (dropped || !direct.follows_glossy(cx, sp)) {
                     direct.value.glossy = Rgb::ZERO;
+                }
+                direct.value.diffuse *= w.beta;
+                if S::GLOSSY {
+                    direct.value.glossy *= w.beta;
                 }
                 lights.push(Direct {
                     ray: direct.ray,
-                    value: direct.value * w.beta,
+                    value: direct.value,
                     walk: w.walk,
                     pixel: w.pixel,
                 });

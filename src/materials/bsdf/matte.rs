@@ -32,6 +32,8 @@ impl Matte {
 }
 
 impl Scattering for Matte {
+    const GLOSSY: bool = false;
+
     #[inline(always)]
     fn eval(&self, wi: DVec3, weight: impl Fn(f64) -> f64) -> BsdfValue {
         let cos = wi.dot(self.n);

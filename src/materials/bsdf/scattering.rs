@@ -7,6 +7,9 @@ use crate::math::DVec3;
 /// A scattering function at one point, seen from one direction. Code that is generic over it is
 /// compiled once for the whole stack of lobes, and once for surfaces that need none.
 pub trait Scattering {
+    /// Whether it may scatter in another way than diffusely.
+    const GLOSSY: bool = true;
+
     /// As [`Bsdf::eval`].
     fn eval(&self, wi: DVec3, weight: impl Fn(f64) -> f64) -> BsdfValue;
     /// As [`Bsdf::sample`].
