@@ -30,16 +30,8 @@ fn veil(alpha: f64, mode: AlphaMode) -> MaterialDesc {
 /// from 1 at its left to 0 at its right in its vertices' colours.
 fn sheet() -> TriangleMesh {
     TriangleMesh {
-        positions: vec![
-            [-1.0, -1.0, 0.0],
-            [1.0, -1.0, 0.0],
-            [1.0, 1.0, 0.0],
-            [-1.0, 1.0, 0.0],
-        ],
-        indices: vec![[0, 1, 2], [0, 2, 3]],
-        uv_sets: vec![vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]],
         colors: [1.0, 0.0, 0.0, 1.0].map(|a| [1.0, 1.0, 1.0, a]).to_vec(),
-        ..Default::default()
+        ..common::square()
     }
 }
 

@@ -13,7 +13,7 @@ use common::chi2::chi2;
 use common::points::{Specimen, direction, point};
 use common::stats::Samples;
 use dualight::color::Rgb;
-use dualight::geometry::{Surface, TriangleMesh};
+use dualight::geometry::Surface;
 use dualight::materials::fresnel::{self, Schlick};
 use dualight::materials::lobes::{GgxReflection, Sheen};
 use dualight::materials::{
@@ -341,20 +341,7 @@ fn no_stack_of_white_layers_shines_in_the_furnace() {
 fn sheet(desc: &MaterialDesc) -> Scene {
     let mut b = SceneBuilder::default();
     let material = b.add_material(desc).expect("valid");
-    let shape = b.add_mesh(
-        TriangleMesh {
-            positions: vec![
-                [-1.0, -1.0, 0.0],
-                [1.0, -1.0, 0.0],
-                [1.0, 1.0, 0.0],
-                [-1.0, 1.0, 0.0],
-            ],
-            indices: vec![[0, 1, 2], [0, 2, 3]],
-            uv_sets: vec![vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]],
-            ..Default::default()
-        },
-        "sheet",
-    );
+    let shape = b.add_mesh(common::square(), "sheet");
     b.place(MeshPlacement {
         shape,
         material,

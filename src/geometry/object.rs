@@ -154,18 +154,8 @@ impl Object {
             return b;
         };
         let mut out = Aabb::EMPTY;
-        if b.is_empty() {
-            return out;
-        }
-        for k in 0..8 {
-            let pick = |bit: usize, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
-            let corner = DVec3::new(
-                pick(0, b.min.x, b.max.x),
-                pick(1, b.min.y, b.max.y),
-                pick(2, b.min.z, b.max.z),
-            );
-            out.grow(place.world_from_object.transform_point3(corner));
-        }
+        b.corners_under(&place.world_from_object)
+            .for_each(|corner| out.grow(corner));
         out
     }
 }

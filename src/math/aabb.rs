@@ -1,6 +1,6 @@
 //! Axis-aligned boxes and bounding spheres.
 
-use super::DVec3;
+use super::{DAffine3, DVec3};
 
 /// An axis-aligned box; empty when `min > max` in any axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +32,16 @@ impl Aabb {
             min: self.min.min(other.min),
             max: self.max.max(other.max),
         }
+    }
+
+    /// Its corners under an affine map; none of an empty box.
+    pub fn corners_under(self, map: &DAffine3) -> impl Iterator<Item = DVec3> {
+        let n = if self.is_empty() { 0 } else { 8 };
+        (0..n).map(move |k| {
+            let ends = [self.min, self.max];
+            let corner = [0, 1, 2].map(|axis| ends[k >> axis & 1][axis]);
+            map.transform_point3(corner.into())
+        })
     }
 
     /// Whether it holds no point at all.

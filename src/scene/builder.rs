@@ -289,21 +289,9 @@ impl SceneBuilder {
         for p in &self.placements {
             let b = *local[p.shape.index()]
                 .get_or_insert_with(|| self.shapes[p.shape.index()].bounds());
-            if b.is_empty() {
-                continue;
-            }
-            for k in 0..8 {
-                let pick = |bit: usize, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
-                let corner = DVec3::new(
-                    pick(0, b.min.x, b.max.x),
-                    pick(1, b.min.y, b.max.y),
-                    pick(2, b.min.z, b.max.z),
-                );
-                let w = p.world_from_object.transform_point3(corner);
-                if w.is_finite() {
-                    all.grow(w);
-                }
-            }
+            b.corners_under(&p.world_from_object)
+                .filter(|corner| corner.is_finite())
+                .for_each(|corner| all.grow(corner));
         }
         let center = all.center();
         // Around the origin nothing is gained, and the file's coordinates stay as they are.

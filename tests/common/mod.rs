@@ -61,6 +61,22 @@ pub fn lamp(radiance: Rgb) -> MaterialDesc {
     }
 }
 
+/// A square of half width 1 in the plane z = 0, with texture coordinates from 0 to 1 along x and
+/// from 1 to 0 along y.
+pub fn square() -> TriangleMesh {
+    TriangleMesh {
+        positions: vec![
+            [-1.0, -1.0, 0.0],
+            [1.0, -1.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [-1.0, 1.0, 0.0],
+        ],
+        indices: vec![[0, 1, 2], [0, 2, 3]],
+        uv_sets: vec![vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]],
+        ..Default::default()
+    }
+}
+
 /// Adds a parallelogram; its front is where `e1 × e2` points.
 pub fn add_quad(
     b: &mut SceneBuilder,
