@@ -7,7 +7,7 @@ pub use progressive::{Progressive, Session, Standing};
 
 use std::time::Instant;
 
-use foreseen::{plan_layer, smooth};
+use foreseen::{hindrance, plan_layer};
 use progressive::Forecast;
 
 use crate::cameras::{framing, with_lens};
@@ -110,6 +110,8 @@ pub struct Rendering {
     pub stopped: Option<Stopped>,
     /// What was simulated and what was skipped, with reasons.
     pub effects: Vec<Decision>,
+    /// Why indirect light was not interpolated in pixels without an edge, if it was not.
+    pub not_interpolated: Option<&'static str>,
 }
 
 /// Renders a scene.
@@ -337,9 +339,10 @@ fn render_in_pool(
         }
     }
 
+    let not_interpolated = hindrance(adaptive, settings.interpolation, effects.set);
     if let Some(plan) = &plan {
         let edges = plan.edges(&film);
-        if settings.interpolation && smooth(effects.set) {
+        if not_interpolated.is_none() {
             film.interpolate(&edges);
             clock.lap("interpolation");
         }
@@ -363,6 +366,7 @@ fn render_in_pool(
         film,
         stopped: control.stopped(),
         effects: effects.decisions,
+        not_interpolated,
     })
 }
 

@@ -35,11 +35,11 @@ pub(super) fn table(s: &Summary) -> String {
             match r.pixel_sampling {
                 PixelSampling::Uniform => format!("{} samples each", s.metadata.spp),
                 PixelSampling::Adaptive => format!(
-                    "{} samples in the mean{}",
+                    "{} samples in the mean, indirect light {}",
                     r.spp,
-                    match s.rendering.film.reach() {
-                        Some(_) => ", indirect light interpolated",
-                        None => "",
+                    match s.rendering.not_interpolated {
+                        None => "interpolated".into(),
+                        Some(why) => format!("not interpolated ({why})"),
                     }
                 ),
             },
@@ -162,6 +162,7 @@ pub(super) fn json(s: &Summary) -> String {
             "emission": r.emission,
             "pixel_sampling": r.pixel_sampling.name(),
             "interpolation": r.interpolation,
+            "not_interpolated": s.rendering.not_interpolated,
             "effects": r.effects,
             "width": r.width,
             "height": r.height,

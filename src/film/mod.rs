@@ -159,21 +159,6 @@ impl Film {
         }
     }
 
-    /// Tells of the samples of a pixel that are added what one half of them brought: their number
-    /// and the sum of their indirect radiance.
-    pub fn add_half(&mut self, [x, y]: [u32; 2], indirect: Rgb, samples: u32) {
-        self.half.resize(self.counts.len(), Default::default());
-        let kept = self.kept[Component::Indirect as usize];
-        let values = indirect.to_f32();
-        if kept && values.iter().all(|v| v.is_finite()) {
-            let (sum, n) = &mut self.half[y as usize * self.width as usize + x as usize];
-            for (a, v) in sum.iter_mut().zip(values) {
-                *a += v;
-            }
-            *n += samples;
-        }
-    }
-
     /// Indirect radiance of both halves of the samples of each pixel, summed, and how many they
     /// are.
     fn halves(&self) -> impl Iterator<Item = [([f32; 3], u32); 2]> {
@@ -186,9 +171,8 @@ impl Film {
         })
     }
 
-    /// Interpolates the indirect light of what was added so far, in all pixels without an edge (one
-    /// flag a pixel, row by row) that have [halves](Self::add_half). Images developed from now on
-    /// show it.
+    /// Interpolates the indirect light of what was [added by halves](Self::add_halves), in all pixels
+    /// without an edge: one flag a pixel, row by row. Images developed from now on show it.
     pub fn interpolate(&mut self, edges: &[bool]) {
         self.interpolated = None;
         self.interpolated = Some(interpolation::interpolate(self, edges));
@@ -285,29 +269,52 @@ impl Film {
     pub fn add(&mut self, tile: &Tile) {
         for (k, sum) in tile.sums.iter().enumerate() {
             let (dx, dy) = (k as u32 % tile.width, k as u32 / tile.width);
-            let i = (tile.y + dy) as usize * self.width as usize + (tile.x + dx) as usize;
-            let mut values = sum.values();
-            for (k, kept) in self.kept.into_iter().enumerate() {
-                if !kept {
-                    values[3 * k..3 * k + 3].fill(0.0);
-                }
-            }
-            let mut with = self.sums[i];
-            for (a, v) in with.iter_mut().zip(values) {
+            self.add_pixel([tile.x + dx, tile.y + dy], sum, tile.samples);
+        }
+    }
+
+    /// Adds the samples of one pixel by halves, each with its sum and number: what
+    /// [`interpolate`](Self::interpolate) goes by.
+    pub fn add_halves(&mut self, at: [u32; 2], [(mut sum, n), (rest, m)]: [(PixelSample, u32); 2]) {
+        let indirect = sum.radiance[Component::Indirect as usize].to_f32();
+        sum.merge(&rest);
+        if self.add_pixel(at, &sum, n + m) {
+            self.half.resize(self.counts.len(), Default::default());
+            let (half, samples) =
+                &mut self.half[self.width as usize * at[1] as usize + at[0] as usize];
+            for (a, v) in half.iter_mut().zip(indirect) {
                 *a += v;
             }
-            if with.iter().all(|v| v.is_finite()) {
-                self.sums[i] = with;
-                self.counts[i] += tile.samples;
-                if let Some(p) = &mut self.passes {
-                    p.add(i, &values, tile.samples);
-                }
-            } else {
-                self.rejected += 1;
-                let at = [tile.y + dy, tile.x + dx];
-                self.first_rejected = Some(self.first_rejected.map_or(at, |first| first.min(at)));
+            *samples += n;
+        }
+    }
+
+    /// Whether the sum of a pixel was finite and was added.
+    fn add_pixel(&mut self, [x, y]: [u32; 2], sum: &PixelSample, samples: u32) -> bool {
+        let i = y as usize * self.width as usize + x as usize;
+        let mut values = sum.values();
+        for (k, kept) in self.kept.into_iter().enumerate() {
+            if !kept {
+                values[3 * k..3 * k + 3].fill(0.0);
             }
         }
+        let mut with = self.sums[i];
+        for (a, v) in with.iter_mut().zip(values) {
+            *a += v;
+        }
+        let finite = with.iter().all(|v| v.is_finite());
+        if finite {
+            self.sums[i] = with;
+            self.counts[i] += samples;
+            if let Some(p) = &mut self.passes {
+                p.add(i, &values, samples);
+            }
+        } else {
+            self.rejected += 1;
+            let at = [y, x];
+            self.first_rejected = Some(self.first_rejected.map_or(at, |first| first.min(at)));
+        }
+        finite
     }
 
     /// Smallest and largest number of samples of a pixel.

@@ -16,9 +16,8 @@ use super::camera_pass::View;
 use super::pixel_edges::Finder;
 use super::{BATCH, Integrator, RenderContext, Sample, Scratch, Spacing};
 use crate::cameras::Camera;
-use crate::color::Rgb;
 use crate::control::Control;
-use crate::film::{Component, Film, PixelSample, Tile};
+use crate::film::{Film, PixelSample};
 use crate::sampling::{hash2, stream};
 use crate::stats::RayCounts;
 use arrayvec::ArrayVec;
@@ -227,31 +226,19 @@ fn take(
                 }
                 stage.advance(u64::from(n));
                 let spread = Spread::of(&sums);
-                let mut sum = PixelSample::default();
-                let mut half = (Rgb::ZERO, 0);
+                let mut halves = [(PixelSample::default(), 0); 2];
                 for (s, number) in sums.iter().zip(first..) {
+                    let (sum, n) = &mut halves[(number % 2) as usize];
                     sum.merge(s);
-                    if number % 2 == 0 {
-                        half.0 += s.radiance[Component::Indirect as usize];
-                        half.1 += 1;
-                    }
+                    *n += 1;
                 }
-                let tile = Tile {
-                    x: px,
-                    y: py,
-                    width: 1,
-                    height: 1,
-                    sums: vec![sum],
-                    samples: n,
-                };
-                Some((i, spread, tile, half, scratch.rays))
+                Some((i, spread, [px, py], halves, scratch.rays))
             })
             .collect();
-        for (i, spread, tile, (indirect, samples), traced) in taken.into_iter().flatten() {
+        for (i, spread, at, halves, traced) in taken.into_iter().flatten() {
             out[i] = spread;
             rays.add(&traced);
-            film.add_half([tile.x, tile.y], indirect, samples);
-            film.add(&tile);
+            film.add_halves(at, halves);
         }
     }
     out

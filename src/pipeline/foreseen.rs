@@ -3,12 +3,27 @@
 use crate::effects::EffectSet;
 use crate::film::{Channel, Film, Layer};
 
-/// Whether indirect light may be interpolated in pixels without an edge: not where surfaces have
-/// finer detail than edges tell of, as maps of normals and leaves cut out by alpha, nor where a lens
-/// blurs the edges.
-pub(super) fn smooth(effects: EffectSet) -> bool {
-    let detail = EffectSet::NORMALS | EffectSet::ALPHA | EffectSet::LENS;
-    effects.contains(EffectSet::INDIRECT) && !effects.intersects(detail)
+/// Why indirect light is not to be interpolated in pixels without an edge, if it is not.
+pub(super) fn hindrance(adaptive: bool, wanted: bool, effects: EffectSet) -> Option<&'static str> {
+    [
+        (adaptive, "no edges are forecast for even samples"),
+        (wanted, "as was asked for"),
+        (effects.contains(EffectSet::INDIRECT), "there is none"),
+        (
+            !effects.intersects(EffectSet::NORMALS),
+            "maps of normals have finer detail than edges tell of",
+        ),
+        (
+            !effects.intersects(EffectSet::ALPHA),
+            "surfaces that are not whole have finer detail than edges tell of",
+        ),
+        (
+            !effects.intersects(EffectSet::LENS),
+            "edges are not where a lens blurs them",
+        ),
+    ]
+    .into_iter()
+    .find_map(|(fits, why)| (!fits).then_some(why))
 }
 
 /// What was foreseen of each pixel, and what came of it.

@@ -267,50 +267,52 @@ pub(super) fn interpolate(film: &Film, edges: &[bool]) -> Interpolated {
                 let reach = REACHES[views[k].median(&reaches[1 - k], i)];
                 (views[k].fit(i, reach), reach)
             });
-            let (Some(one), Some(other)) = (a.0, b.0) else {
-                return (None, 0.0);
-            };
-            if a.1 + b.1 == 0 {
-                return (None, 0.0);
+            match (a, b) {
+                ((Some(x), m), (Some(y), n)) if m + n > 0 => {
+                    (Some(both(&views, i, [x, y])), 0.5 * (m + n) as f32)
+                }
+                _ => (None, 0.0),
             }
-            let [p, q] = [&views[0].pixels[i], &views[1].pixels[i]];
-            let share = p.samples / (p.samples + q.samples);
-            let light = |c: usize| share * one[c] + (1.0 - share) * other[c];
-            let radiance = [0, 1, 2].map(|c| light(c).max(0.0) * p.albedo[c]);
-            (Some(radiance), 0.5 * (a.1 + b.1) as f32)
         })
         .unzip();
     let mut out = Interpolated { radiance, reach };
-    keep_flux(&mut out, &views);
+    keep_flux(&mut out.radiance, &views);
     out
+}
+
+/// The radiance of pixel `i` by the light that each half tells.
+fn both(views: &[View; 2], i: usize, light: [[f32; 3]; 2]) -> [f32; 3] {
+    let [p, q] = [&views[0].pixels[i], &views[1].pixels[i]];
+    let share = p.samples / (p.samples + q.samples);
+    [0, 1, 2].map(|c| {
+        let mean = share * light[0][c] + (1.0 - share) * light[1][c];
+        mean.max(0.0) * p.albedo[c]
+    })
 }
 
 /// What windows cut off the peaks of the irradiance is less than its noise, but it is always cut
 /// off: each surface gets back what it had in all.
-fn keep_flux(out: &mut Interpolated, views: &[View; 2]) {
-    let surface = |i: usize| views[0].pixels[i].surface as usize;
-    let most = views[0].pixels.iter().map(|p| p.surface).max();
-    let mut sums = vec![[[0.0_f64; 2]; 3]; most.map_or(0, |n| n as usize + 1)];
-    let known = |out: &Interpolated| -> Vec<(usize, [f32; 3])> {
-        let all = out.radiance.iter().enumerate();
-        all.filter_map(|(i, r)| Some((i, (*r)?))).collect()
-    };
-    let known = known(out);
-    for (i, radiance) in &known {
-        let [p, q] = [&views[0].pixels[*i], &views[1].pixels[*i]];
-        let share = p.samples / (p.samples + q.samples);
-        for c in 0..3 {
-            let own = (share * p.light[c] + (1.0 - share) * q.light[c]) * p.albedo[c];
-            let sum = &mut sums[surface(*i)][c];
-            *sum = [sum[0] + f64::from(own), sum[1] + f64::from(radiance[c])];
+fn keep_flux(radiance: &mut [Option<[f32; 3]>], views: &[View; 2]) {
+    let pixels = &views[0].pixels;
+    let surfaces = pixels.iter().map(|p| p.surface as usize + 1).max();
+    // Of each surface: what its pixels had, and what they have now.
+    let mut sums = vec![[[0.0_f64; 3]; 2]; surfaces.unwrap_or(0)];
+    for (i, new) in radiance.iter().enumerate() {
+        let Some(new) = *new else { continue };
+        let own = both(views, i, [0, 1].map(|k: usize| views[k].pixels[i].light));
+        for (sum, values) in sums[pixels[i].surface as usize].iter_mut().zip([own, new]) {
+            for (a, v) in sum.iter_mut().zip(values) {
+                *a += f64::from(v);
+            }
         }
     }
-    for (i, radiance) in known {
-        let factor = |c: usize| match sums[surface(i)][c] {
-            [own, new] if new > 0.0 => (own / new) as f32,
-            _ => 1.0,
-        };
-        out.radiance[i] = Some([0, 1, 2].map(|c| radiance[c] * factor(c)));
+    for (radiance, pixel) in radiance.iter_mut().zip(pixels) {
+        let [had, have] = sums[pixel.surface as usize];
+        for (c, v) in radiance.iter_mut().flatten().enumerate() {
+            if have[c] > 0.0 {
+                *v *= (had[c] / have[c]) as f32;
+            }
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 use super::*;
 use crate::color::Rgb;
-use crate::film::{Component, PixelSample, Tile};
+use crate::film::{Component, PixelSample};
 use crate::math::DVec3;
 use crate::sampling::Rng;
 
@@ -14,33 +14,19 @@ fn after(light: impl Fn(f64, f64) -> f64, noise: f64, edges: &[bool]) -> Vec<f64
     let albedo = |x: u32, y: u32| 0.3 + 0.1 * f64::from((x * 7 + y * 3) % 5);
     for y in 0..SIDE {
         for x in 0..SIDE {
-            let mut s = PixelSample {
-                albedo: Rgb::splat(albedo(x, y)),
-                normal: DVec3::Z,
-                ..Default::default()
-            };
-            // Uniform noise of unit variance.
-            let u = (rng.next_1d() - 0.5) * 12f64.sqrt();
-            let e = light(f64::from(x), f64::from(y)) + noise * u;
-            s.add(Component::Indirect, Rgb::splat(e * albedo(x, y)));
-            let half = [s.radiance[Component::Indirect as usize]; 2];
-            let both = {
+            let halves = [0; 2].map(|_| {
+                let mut s = PixelSample {
+                    albedo: Rgb::splat(albedo(x, y)),
+                    normal: DVec3::Z,
+                    ..Default::default()
+                };
+                // Uniform noise of unit variance.
                 let u = (rng.next_1d() - 0.5) * 12f64.sqrt();
                 let e = light(f64::from(x), f64::from(y)) + noise * u;
                 s.add(Component::Indirect, Rgb::splat(e * albedo(x, y)));
-                s.albedo *= 2.0;
-                s.normal *= 2.0;
-                s
-            };
-            film.add_half([x, y], half[0], 1);
-            film.add(&Tile {
-                x,
-                y,
-                width: 1,
-                height: 1,
-                sums: vec![both],
-                samples: 2,
+                (s, 1)
             });
+            film.add_halves([x, y], halves);
         }
     }
     film.interpolate(edges);
