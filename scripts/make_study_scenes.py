@@ -9,10 +9,10 @@ textured.glb  bricks and tiles: colours, roughness and bumps from images
 
 Standard library only; the same files every time.
 """
+import argparse
 import math
 import random
 import struct
-import sys
 import zlib
 from pathlib import Path
 
@@ -256,7 +256,9 @@ def textured():
 
 
 def main():
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("."), metavar="FOLDER")
+    folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     for make in (caustics, interior, textured):
         write_glb(folder / f"{make.__name__}.glb", *make())

@@ -233,6 +233,7 @@ fn render_in_pool(
                 .into(),
         ));
     }
+    let not_interpolated = hindrance(adaptive, settings.interpolation, effects.set);
     let mut plan: Option<PixelPlan> = None;
     let mut rays = RayCounts::default();
     let [mut global_photons, mut caustic_photons] = [PhotonCounts::default(); 2];
@@ -306,6 +307,7 @@ fn render_in_pool(
                 samples,
                 (&spacing, differentials),
                 region,
+                not_interpolated.is_none(),
                 &mut film,
                 inner,
             )
@@ -339,7 +341,6 @@ fn render_in_pool(
         }
     }
 
-    let not_interpolated = hindrance(adaptive, settings.interpolation, effects.set);
     if let Some(plan) = &plan {
         let edges = plan.edges(&film);
         if not_interpolated.is_none() {

@@ -47,33 +47,32 @@ fn indirect_light_has_a_third_of_the_error() {
     let scene = common::box_scene();
     let reference = reference(&scene);
     let [mut own, mut interpolated, mut off] = [0.0; 3];
+    let layers = ["direct", "specular", "caustics", "indirect"];
+    let mut whole = [0.0; 2];
     for seed in 0..2 {
-        let (a, b) = (image(&scene, 8, seed, false), image(&scene, 8, seed, true));
-        own += relative("indirect", &a, &reference);
-        interpolated += relative("indirect", &b, &reference);
-        off += (mean(&b, "indirect") / mean(&a, "indirect") - 1.0) / 2.0;
-        for layer in ["direct", "specular", "caustics", "albedo"] {
-            assert_eq!(a.rgb(layer), b.rgb(layer), "{layer}");
+        let pair = [false, true].map(|on| image(&scene, 8, seed, on));
+        let [a, b] = &pair;
+        own += relative("indirect", a, &reference);
+        interpolated += relative("indirect", b, &reference);
+        off += (mean(b, "indirect") / mean(a, "indirect") - 1.0) / 2.0;
+        for (sum, image) in whole.iter_mut().zip(&pair) {
+            *sum += relative("", image, &reference);
         }
-        // Pixels with an edge keep their own; the beauty stays the sum of its parts.
-        let edges = b.channel("pixels", "edges").unwrap();
-        let reach = b.channel("pixels", "reach").unwrap();
-        let [x, y] = [&a, &b].map(|i| i.rgb("indirect").unwrap());
-        let parts = ["direct", "specular", "caustics", "indirect"].map(|l| b.rgb(l).unwrap());
+        // The beauty stays the sum of its parts.
+        let parts = layers.map(|l| b.rgb(l).unwrap());
         for (i, all) in b.rgb("").unwrap().iter().enumerate() {
-            if edges[i] > 0.0 || reach[i] == 0.0 {
-                assert_eq!(x[i], y[i]);
-            }
             for c in 0..3 {
                 let sum: f32 = parts.iter().map(|p| p[i][c]).sum();
                 assert!((sum - all[c]).abs() <= 1e-5 * all[c].abs().max(1.0));
             }
         }
     }
-    println!("{interpolated} of {own}, mean {off}");
+    println!("{interpolated} of {own}, mean {off}, whole {whole:?}");
     assert!(interpolated < own / 3.0, "{interpolated} of {own}");
-    // Each surface keeps the flux that it had.
-    assert!(off.abs() < 1e-4, "{off}");
+    // Two pictures of different samples: the mean of one is good to some tenths of a percent.
+    assert!(off.abs() < 0.01, "{off}");
+    // Samples that indirect light no longer calls for serve the rest.
+    assert!(whole[1] < 0.6 * whole[0], "{whole:?}");
 }
 
 #[test]

@@ -83,6 +83,7 @@ impl Pixel<'_> {
                 .camera_ray(view.camera, x, y, lens, view.differentials),
             sampler,
             pixel: sum,
+            gathering: 1.0,
         }
     }
 }

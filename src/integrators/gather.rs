@@ -41,8 +41,8 @@ pub(super) struct DiffuseLight {
 }
 
 impl PhotonMapping<'_> {
-    /// Everything that the diffuse lobes at a point send back. `share` is how much of it the
-    /// pixel sees: a faint branch gets fewer rays. `densities` takes the densities of global and
+    /// Everything that the diffuse lobes at a point send back. `shares` are those of the shadow rays
+    /// and of the gather rays: a faint branch gets fewer. `densities` takes the densities of global and
     /// caustic photons, if they are wanted.
     #[expect(
         clippy::too_many_arguments,
@@ -53,7 +53,7 @@ impl PhotonMapping<'_> {
         sp: &SurfacePoint,
         trail: &Trail,
         full: &Bsdf,
-        share: f64,
+        shares: [f64; 2],
         sampler: &mut Sampler,
         mut densities: Option<&mut [f64; 2]>,
         scratch: &mut Scratch,
@@ -69,9 +69,9 @@ impl PhotonMapping<'_> {
         };
         let mut light = DiffuseLight::default();
         let indirect = cx.effects.contains(EffectSet::INDIRECT);
-        let rays = |n: u32| (f64::from(n) * share).ceil() as u32;
+        let rays = |n: u32, share: f64| (f64::from(n) * share).ceil() as u32;
         let gather_rays = if indirect {
-            rays(cx.settings.gather_rays)
+            rays(cx.settings.gather_rays, shares[1])
         } else {
             0
         };
@@ -79,7 +79,7 @@ impl PhotonMapping<'_> {
 
         // Shadow rays.
         let n_shadow = if cx.effects.contains(EffectSet::DIRECT) {
-            rays(cx.settings.shadow_rays)
+            rays(cx.settings.shadow_rays, shares[0])
         } else {
             0
         };

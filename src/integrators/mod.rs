@@ -92,6 +92,9 @@ pub struct Sample {
     pub sampler: Sampler,
     /// Index of the sum that it is added to.
     pub pixel: usize,
+    /// Share of the rays that gather indirect light at what it sees first: less where that light is
+    /// interpolated.
+    pub gathering: f64,
 }
 
 /// A ray from the camera.

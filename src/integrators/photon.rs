@@ -53,6 +53,8 @@ struct Chain {
     differential: Option<Differential>,
     inside: Inside,
     beta: Rgb,
+    /// Share of the gather rays at the next surface.
+    gathering: f64,
     /// Scattering events so far.
     depth: u32,
     /// Density and origin of the last direction; none for a delta lobe or the camera.
@@ -69,6 +71,7 @@ impl Integrator for PhotonMapping<'_> {
                 differential: sample.camera.differential,
                 inside: self.cx.scene.enclosing(sample.camera.ray.origin()),
                 beta: Rgb::ONE,
+                gathering: sample.gathering,
                 depth: 0,
                 last: None,
             });
@@ -105,6 +108,7 @@ impl PhotonMapping<'_> {
             mut differential,
             mut inside,
             mut beta,
+            mut gathering,
             depth: start,
             mut last,
         } = chain;
@@ -156,7 +160,8 @@ impl PhotonMapping<'_> {
                 let first = !std::mem::replace(diffuse_seen, true);
                 let share = beta.max_channel().min(1.0);
                 let densities = first.then_some(&mut out.photons);
-                let part = self.diffuse(&sp, &trail, &bsdf, share, sampler, densities, scratch);
+                let shares = [share, share * gathering];
+                let part = self.diffuse(&sp, &trail, &bsdf, shares, sampler, densities, scratch);
                 for (component, radiance) in [
                     (Component::Direct, part.direct),
                     (Component::Caustics, part.caustics),
@@ -174,6 +179,7 @@ impl PhotonMapping<'_> {
                 return;
             }
             bsdf.keep_specular();
+            gathering = 1.0;
             if depth < SPLIT_DEPTH {
                 // Reflection and refraction are both followed: their shares are known exactly,
                 // and a rare bright reflection is the worst noise that glass has.
@@ -190,6 +196,7 @@ impl PhotonMapping<'_> {
                             differential: trail.leave(&sp, &b),
                             inside: trail.beyond(&b),
                             beta: beta * b.weight,
+                            gathering,
                             depth: depth + 1,
                             last: None,
                         };

@@ -17,7 +17,7 @@ use super::pixel_edges::Finder;
 use super::{BATCH, Integrator, RenderContext, Sample, Scratch, Spacing};
 use crate::cameras::Camera;
 use crate::control::Control;
-use crate::film::{Film, PixelSample};
+use crate::film::{Component, Film, PixelSample};
 use crate::sampling::{hash2, stream};
 use crate::stats::RayCounts;
 use arrayvec::ArrayVec;
@@ -35,6 +35,10 @@ const AROUND: usize = 2;
 /// Least relative deviation, over the mean of the image: what few samples say is uncertain.
 const LEAST: f64 = 0.2;
 
+/// Share of the gather rays in pixels whose indirect light is interpolated: they make the light of
+/// many pixels.
+const GATHERING: f64 = 0.5;
+
 /// Added to the squared mean, as in the relative errors of reports.
 const EPSILON: f64 = 0.01;
 
@@ -44,6 +48,16 @@ pub struct PixelPlan {
     region: Region,
     share: Vec<f32>,
     edges: Vec<bool>,
+    /// Whether indirect light is interpolated in pixels without an edge.
+    interpolated: bool,
+}
+
+/// What is asked of a pixel.
+#[derive(Clone, Copy, Debug)]
+struct Demand {
+    samples: u32,
+    /// Whether its indirect light will be interpolated.
+    interpolated: bool,
 }
 
 /// What the even samples of a pixel say.
@@ -63,6 +77,7 @@ impl PixelPlan {
         integrator: &dyn Integrator,
         samples: u32,
         region: Region,
+        interpolated: bool,
         film: &mut Film,
         rays: &mut RayCounts,
         control: &Control,
@@ -71,8 +86,12 @@ impl PixelPlan {
         let finder = Finder::new(context.scene, context.accel, view.camera, size);
         let (edges, traced) = finder.find(region);
         rays.check += traced;
-        let counts = vec![samples; edges.len()];
-        let spreads = take(view, integrator, region, &counts, film, rays, control);
+        let demand = |edge: &bool| Demand {
+            samples,
+            interpolated: interpolated && !edge,
+        };
+        let demands: Vec<Demand> = edges.iter().map(demand).collect();
+        let spreads = take(view, integrator, region, &demands, film, rays, control);
         let width = (region.x1 - region.x0) as usize;
         let mut deviations: Vec<f64> = (0..edges.len())
             .into_par_iter()
@@ -92,6 +111,7 @@ impl PixelPlan {
             region,
             share: shares(&deviations),
             edges,
+            interpolated,
         }
     }
 
@@ -118,13 +138,14 @@ impl PixelPlan {
         rays: &mut RayCounts,
         control: &Control,
     ) {
-        let counts: Vec<u32> = (0..self.share.len())
-            .map(|i| {
-                self.count(i, view.seed, f64::from(samples))
-                    .saturating_sub(taken)
-            })
-            .collect();
-        take(view, integrator, self.region, &counts, film, rays, control);
+        let demand = |(i, edge): (usize, &bool)| Demand {
+            samples: self
+                .count(i, view.seed, f64::from(samples))
+                .saturating_sub(taken),
+            interpolated: self.interpolated && !edge,
+        };
+        let demands: Vec<Demand> = self.edges.iter().enumerate().map(demand).collect();
+        take(view, integrator, self.region, &demands, film, rays, control);
     }
 
     /// Whether each pixel of the image was forecast to hold an edge, row by row.
@@ -150,6 +171,7 @@ pub fn planned_camera_pass(
     samples: u32,
     (spacing, differentials): (&Spacing, bool),
     region: Region,
+    interpolated: bool,
     film: &mut Film,
     control: &Control,
 ) -> RayCounts {
@@ -167,7 +189,15 @@ pub fn planned_camera_pass(
         None => {
             taken = PixelPlan::even(samples);
             plan.insert(PixelPlan::make(
-                context, &view, integrator, taken, region, film, &mut rays, control,
+                context,
+                &view,
+                integrator,
+                taken,
+                region,
+                interpolated,
+                film,
+                &mut rays,
+                control,
             ))
         }
     };
@@ -182,20 +212,20 @@ pub fn planned_camera_pass(
     rays
 }
 
-/// Takes so many samples in each pixel of the region, numbered on from those that it has.
+/// Takes what is asked of each pixel of the region, numbered on from the samples that it has.
 fn take(
     view: &View<'_>,
     integrator: &dyn Integrator,
     region: Region,
-    counts: &[u32],
+    demands: &[Demand],
     film: &mut Film,
     rays: &mut RayCounts,
     control: &Control,
 ) -> Vec<Spread> {
-    let total = counts.iter().map(|n| u64::from(*n)).sum();
+    let total = demands.iter().map(|d| u64::from(d.samples)).sum();
     let stage = control.stage("pixels", "samples", total);
     let width = region.x1 - region.x0;
-    let mut out = vec![Spread::default(); counts.len()];
+    let mut out = vec![Spread::default(); demands.len()];
     // Only as many pixels are held at a time as keep the threads busy.
     for group in region.tiles().chunks(64) {
         let seen = &*film;
@@ -207,7 +237,10 @@ fn take(
             .par_iter()
             .map(|&[px, py]| {
                 let i = ((py - region.y0) * width + (px - region.x0)) as usize;
-                let n = counts[i];
+                let Demand {
+                    samples: n,
+                    interpolated,
+                } = demands[i];
                 if n == 0 || control.stopped().is_some() {
                     return None;
                 }
@@ -217,15 +250,19 @@ fn take(
                 let mut sums = vec![PixelSample::default(); n as usize];
                 let mut batch = ArrayVec::<Sample, BATCH>::new();
                 let own = view.pixel([px, py]);
+                let gathering = if interpolated { GATHERING } else { 1.0 };
                 for s in 0..n {
-                    batch.push(own.sample(first + s, s as usize));
+                    batch.push(Sample {
+                        gathering,
+                        ..own.sample(first + s, s as usize)
+                    });
                     if batch.is_full() || s + 1 == n {
                         integrator.sample(&mut batch, &mut sums, &mut scratch);
                         batch.clear();
                     }
                 }
                 stage.advance(u64::from(n));
-                let spread = Spread::of(&sums);
+                let spread = Spread::of(&sums, interpolated);
                 let mut halves = [(PixelSample::default(), 0); 2];
                 for (s, number) in sums.iter().zip(first..) {
                     let (sum, n) = &mut halves[(number % 2) as usize];
@@ -245,11 +282,20 @@ fn take(
 }
 
 impl Spread {
-    fn of(samples: &[PixelSample]) -> Self {
-        let values = || samples.iter().map(|s| s.beauty().luminance());
+    /// Of the samples of a pixel. Noise of indirect light that will be interpolated calls for no
+    /// samples.
+    fn of(samples: &[PixelSample], interpolated: bool) -> Self {
         let n = samples.len() as f64;
-        let mean = values().sum::<f64>() / n;
-        let squares: f64 = values().map(|v| (v - mean).powi(2)).sum();
+        let noisy = |s: &PixelSample| {
+            let rest = match interpolated {
+                true => s.beauty() - s.radiance[Component::Indirect as usize],
+                false => s.beauty(),
+            };
+            rest.luminance()
+        };
+        let around = samples.iter().map(noisy).sum::<f64>() / n;
+        let squares: f64 = samples.iter().map(|s| (noisy(s) - around).powi(2)).sum();
+        let mean = samples.iter().map(|s| s.beauty().luminance()).sum::<f64>() / n;
         Self {
             mean,
             variance: squares / (n - 1.0).max(1.0),

@@ -62,16 +62,21 @@ pub struct PhotonSettings {
     pub roulette: bool,
 }
 
-/// Photons of a map for each one of its pilot emission, which decides the kernels.
+/// Most photons of a map for each one of its pilot emission, which decides the kernels.
 const PILOT_SHARE: u64 = 8;
+
+/// Fewest photons of the pilot emission in a kernel. A kernel serves as far as it reaches, so where
+/// there are `n` in the mean, a share of `e⁻ⁿ` of all places has none.
+const PILOTS_IN_KERNEL: u64 = 4;
 
 impl PhotonSettings {
     /// Those of the pilot emission.
     fn pilot(&self) -> Self {
+        let share = (self.nearest as u64 / PILOTS_IN_KERNEL).clamp(1, PILOT_SHARE);
         Self {
             seed: hash2(self.seed, stream::PILOT),
-            global: self.global.div_ceil(PILOT_SHARE),
-            caustic: self.caustic.div_ceil(PILOT_SHARE),
+            global: self.global.div_ceil(share),
+            caustic: self.caustic.div_ceil(share),
             ..self.clone()
         }
     }

@@ -2,21 +2,21 @@
 //! pixels around that see the same surface, not from their own samples alone.
 //!
 //! What is interpolated is irradiance (indirect light over albedo), which is smooth where the
-//! picture is not. A plane fitted to the pixels around gives its value and its derivative; how far
-//! around is decided by what that derivative cannot follow. Windows grow as long as the
-//! confidence intervals of what they say have a point in common: once the bend of the irradiance
-//! outweighs the noise, they have none (Goldenshluger and Nemirovski 1997; Katkovnik 1999). So
-//! the error of interpolation stays below that of the noise which it takes away, and both vanish
-//! as samples are added.
+//! picture is not. A plane fitted to the pixels around gives its value and its derivative. How far
+//! around is decided by what that derivative cannot follow: by the error that windows of each size
+//! make ([`windows`]), which is that of the noise they leave and of the bend they miss together. So
+//! both vanish as samples are added.
 //!
-//! Noise is rare bright samples. Windows that looked at the samples they average would stop before
-//! such a one, and its light would be lost: 1 % of all in the box by paths. So each half of the
-//! samples is averaged over windows that the other half has chosen.
+//! Each half of the samples is averaged over windows that were chosen without it: windows that
+//! looked at the samples they average would stop before a rare bright one, and its light would be
+//! lost, 1 % of all in the box by paths. (Two halves for the same reason: Rousselle, Knaus and
+//! Zwicker, *Adaptive Rendering with Non-Local Means Filtering*, ACM TOG 31(6), 2012.)
 //!
 //! Local planes in rendering: Moon, Carr and Yoon, *Adaptive Rendering Based on Weighted Local
 //! Regression*, ACM TOG 33(5), 2014.
 
 mod fit;
+mod windows;
 
 use arrayvec::ArrayVec;
 use rayon::prelude::*;
@@ -26,20 +26,6 @@ use super::Film;
 
 /// Half widths of the windows, in pixels.
 const REACHES: [i32; 7] = [0, 1, 2, 3, 5, 8, 12];
-
-/// Half width of the window in which noise is averaged.
-const NOISE: i32 = 8;
-
-/// Fewest pixels that tell it.
-const FEWEST: u32 = 10;
-
-/// What tells noise from light: it is blind to planes, to all that bends along one axis only, and
-/// to straight steps along the other (Immerkær, *Fast Noise Variance Estimation*, 1996).
-const LAPLACE: [[f64; 3]; 3] = [[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]];
-
-/// Half width of the intervals, in standard deviations. Of 1.5, 2 and 3 the first left least
-/// error in the box, by a tenth; wider ones blur more.
-const INTERVAL: f64 = 1.5;
 
 /// Least cosine between the normals of pixels that see one surface.
 const AGREEMENT: f32 = 0.9;
@@ -81,8 +67,6 @@ struct View {
     width: i32,
     height: i32,
     pixels: Vec<Pixel>,
-    /// Variance of a sample as told by each pixel and the eight around it.
-    noise: Vec<Option<f32>>,
 }
 
 impl View {
@@ -113,39 +97,12 @@ impl View {
                     normal: normal(i),
                 }
             };
-            let mut view = Self {
+            Self {
                 width: width as i32,
                 height: film.height() as i32,
                 pixels: film.halves().enumerate().map(pixel).collect(),
-                noise: Vec::new(),
-            };
-            let all = (0..view.pixels.len()).into_par_iter();
-            view.noise = all.map(|i| view.roughness(i)).collect();
-            view
-        })
-    }
-
-    fn roughness(&self, i: usize) -> Option<f32> {
-        let (mut n, mut sum, mut variance) = (0, 0.0, 0.0);
-        self.around(i, -1, 1, |_, o, x, y| {
-            let c = LAPLACE[(y + 1.0) as usize][(x + 1.0) as usize];
-            n += 1;
-            sum += c * f64::from(o.mean);
-            variance += c * c / f64::from(o.samples);
-        });
-        (n == 9 && self.pixels[i].samples > 0.0).then(|| (sum * sum / variance) as f32)
-    }
-
-    /// Variance of a sample around a pixel; `None` if too few pixels tell.
-    fn noise(&self, i: usize) -> Option<f64> {
-        let (mut n, mut sum) = (0, 0.0);
-        self.around(i, -1, NOISE, |k, _, _, _| {
-            if let Some(v) = self.noise[k] {
-                n += 1;
-                sum += f64::from(v);
             }
-        });
-        (n >= FEWEST).then(|| sum / f64::from(n))
+        })
     }
 
     /// Calls `f` with the pixels that see what pixel `i` sees, farther than `inner` and up to
@@ -166,37 +123,6 @@ impl View {
                 }
             }
         }
-    }
-
-    /// How far the window of a pixel may reach: an index of [`REACHES`].
-    fn reach(&self, i: usize) -> usize {
-        if self.pixels[i].samples == 0.0 {
-            return 0;
-        }
-        let Some(noise) = self.noise(i) else {
-            return 0;
-        };
-        let (mut matrix, mut moments) = (Normal::default(), Moments::default());
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        let mut inner = -1;
-        for (k, reach) in REACHES.into_iter().enumerate() {
-            self.around(i, inner, reach, |_, o, x, y| {
-                let w = f64::from(o.samples);
-                matrix.add(w, x, y);
-                moments.add(w, x, y, f64::from(o.mean));
-            });
-            inner = reach;
-            let Some(inverse) = matrix.inverse() else {
-                return k.saturating_sub(1);
-            };
-            let value = moments.dot(inverse[0]);
-            let half = INTERVAL * (noise * inverse[0][0]).sqrt();
-            (low, high) = (low.max(value - half), high.min(value + half));
-            if !(low <= high) {
-                return k.saturating_sub(1);
-            }
-        }
-        REACHES.len() - 1
     }
 
     /// The median of what is known of the pixels about `i`: the luck of one must not show as a speck.
@@ -260,11 +186,15 @@ fn surfaces(width: usize, edges: &[bool]) -> Vec<u32> {
 pub(super) fn interpolate(film: &Film, edges: &[bool]) -> Interpolated {
     let views = View::halves(film, edges);
     let all = || (0..edges.len()).into_par_iter();
-    let reaches: [Vec<usize>; 2] = [0, 1].map(|k| all().map(|i| views[k].reach(i)).collect());
+    let fits = [0, 1].map(|k: usize| all().map(|i| views[k].fits(i)).collect::<Vec<_>>());
+    let reaches = [0, 1].map(|k: usize| {
+        let best = |i| views[k].best(i, &fits[1 - k]);
+        all().map(best).collect::<Vec<_>>()
+    });
     let (radiance, reach) = all()
         .map(|i| {
             let [a, b] = [0, 1].map(|k| {
-                let reach = REACHES[views[k].median(&reaches[1 - k], i)];
+                let reach = REACHES[views[k].median(&reaches[k], i)];
                 (views[k].fit(i, reach), reach)
             });
             match (a, b) {
