@@ -133,8 +133,61 @@ fn tables_hold_every_point() {
     let markdown = accuracy::markdown(analysis);
     let levels: usize = analysis.curves.iter().map(|c| c.times.len()).sum();
     let rows = markdown.lines().filter(|l| l.starts_with('|')).count();
-    // Two tables with two lines of head each.
-    assert_eq!(rows, 4 + levels + accuracy::CHANGES.len());
+    let parts = analysis.curves.iter().flat_map(|c| &c.components);
+    let parts: usize = parts.map(|c| c.times.len()).sum();
+    // Three tables with two lines of head each.
+    assert_eq!(rows, 6 + levels + parts + accuracy::CHANGES.len());
+    let times = accuracy::times_csv(analysis);
+    assert_eq!(times.lines().count(), 1 + levels + parts);
+    let columns = |l: &str| l.split(',').count();
+    let mut widths = times.lines().map(columns);
+    let head = widths.next().unwrap();
+    assert!(widths.all(|n| n == head));
+}
+
+/// What the table says of a component is what its points say: between the two points of a ladder
+/// whose errors enclose the level lies the time to it, and the ratio is that of two such times.
+#[test]
+fn times_of_components_follow_their_own_errors() {
+    let (_, analysis) = measured();
+    let layers = |c: &accuracy::Curve| c.components.iter().map(|c| c.layer).collect::<Vec<_>>();
+    for c in &analysis.curves {
+        // All that the box has, in every curve alike.
+        assert_eq!(layers(c), layers(&analysis.curves[0]));
+        assert!(layers(c).contains(&"caustics") && layers(c).contains(&"indirect"));
+    }
+    let mut passed = 0;
+    for (c, k) in analysis
+        .curves
+        .iter()
+        .flat_map(|c| (0..c.components.len()).map(move |k| (c, k)))
+    {
+        let error = |p: &accuracy::Point| {
+            let of = p.layers.iter().find(|l| l.layer == c.components[k].layer);
+            of.unwrap().total.value
+        };
+        let ladder: Vec<_> = analysis.curve(&c.method).collect();
+        for (i, l) in c.components[k].times.iter().enumerate() {
+            assert_eq!(l.error, analysis.curves[0].components[k].times[i].error);
+            let Some(seconds) = &l.seconds else {
+                continue;
+            };
+            passed += 1;
+            let around = ladder.windows(2).find(|w| error(w[1]) <= l.error).unwrap();
+            assert!(error(around[0]) > l.error);
+            let [from, to] = [around[0], around[1]].map(|p| p.seconds.value);
+            let within = from * (1.0 - 1e-9)..=to * (1.0 + 1e-9);
+            assert!(within.contains(&seconds.value), "{l:?}");
+            let first = &analysis.curves[0].components[k].times[i].seconds;
+            if let (Some(r), Some(first)) = (&l.ratio, first) {
+                assert!(
+                    (r.value * seconds.value / first.value - 1.0).abs() < 1e-6,
+                    "{l:?}"
+                );
+            }
+        }
+    }
+    assert!(passed >= 4, "{passed}");
 }
 
 /// What a browser is asked to look at once the page is loaded.

@@ -18,7 +18,7 @@ use crate::report::accuracy::{
 };
 use crate::scene::{Census, Scene};
 
-/// Kinds of files that a report can be.
+/// Kinds of files that a report can be, by how their names end; the first that fits is taken.
 const FORMATS: &[(&str, Writer)] = &[
     ("html", |r| {
         accuracy::page(r.study, r.analysis, r.circumstances, r.registry)
@@ -28,6 +28,7 @@ const FORMATS: &[(&str, Writer)] = &[
         Ok(accuracy::overview(r.analysis, r.study.clock, &title).svg())
     }),
     ("md", |r| Ok(accuracy::markdown(r.analysis))),
+    ("times.csv", |r| Ok(accuracy::times_csv(r.analysis))),
     ("csv", |r| Ok(accuracy::csv(r.analysis))),
     ("json", |r| {
         let value = accuracy::json(r.study, r.analysis, r.circumstances);
@@ -125,12 +126,14 @@ fn writers(args: &AccuracyArgs) -> Result<Vec<Writer>> {
     args.outputs
         .iter()
         .map(|path| {
-            let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-            let found = FORMATS.iter().find(|f| extension.as_deref() == Some(f.0));
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let name = name.to_lowercase();
+            let fits = |end: &str| name.strip_suffix(end).is_some_and(|n| n.ends_with('.'));
+            let found = FORMATS.iter().find(|f| fits(f.0));
             output::check_writable(path)?;
             found.map(|f| f.1).ok_or_else(|| {
                 Error::Usage(format!(
-                    "{}: the extension chooses the format and must be one of .html, .svg, .md, .csv, .json",
+                    "{}: the extension chooses the format and must be one of .html, .svg, .md, .csv, .times.csv, .json",
                     path.display()
                 ))
             })

@@ -17,7 +17,8 @@ pub struct AccuracyArgs {
     #[allow(missing_docs, reason = "clap would show it as the help of the command")]
     pub scene: SceneArgs,
     /// Report to write: .html the whole page, .svg the first plot, .md its tables, .csv and .json the
-    /// numbers. May be given several times [default: only the table below]
+    /// numbers, .times.csv the seconds to each error. May be given several times [default: only the
+    /// table on the terminal]
     #[arg(short, long = "output", value_name = "FILE")]
     pub outputs: Vec<PathBuf>,
     /// Methods, the first being what the others are compared with [default: all there are]

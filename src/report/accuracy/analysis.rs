@@ -1,15 +1,14 @@
-//! What the measured pictures say: error against time, bias and noise apart, times to an error.
+//! What the measured pictures say: error against time, bias and noise apart, what changes do.
 
 use serde::Serialize;
 
 use super::Study;
+use super::curves::{Curve, curves, floor};
 use super::layers::{Moments, Scale, names};
 use super::measure::{Kind, Run};
-use super::methods::{CHANGES, Method, preset};
+use super::methods::{CHANGES, preset};
 use crate::report::diff::Pair;
-use crate::report::statistics::{
-    Interval, Reach, bootstrap, mean, mean_interval, median, reach, slope,
-};
+use crate::report::statistics::{Interval, bootstrap, mean, mean_interval, median};
 
 /// Errors of one layer at one setting, relative to the whole reference.
 #[derive(Clone, Debug, Serialize)]
@@ -47,12 +46,22 @@ pub struct Point {
     pub trimmed: Interval,
     /// Mean FLIP; `None` if this build knows none.
     pub flip: Option<Interval>,
-    /// Seconds and error of the whole picture by repeat.
+    /// What each repeat took and how good it was.
     #[serde(skip)]
-    repeats: Vec<(f64, f64)>,
-    /// FLIP by repeat.
+    pub(super) repeats: Vec<Repeat>,
+    /// Index of its setting.
     #[serde(skip)]
     index: usize,
+}
+
+/// One picture of a setting.
+#[derive(Clone, Debug)]
+pub(super) struct Repeat {
+    /// Seconds on the chosen clock.
+    pub(super) seconds: f64,
+    /// Relative mean squared error of each layer in the order of [`names`], without that of the
+    /// reference; NaN where the reference has no such layer.
+    pub(super) errors: Vec<f64>,
 }
 
 impl Point {
@@ -61,40 +70,16 @@ impl Point {
         self.layers[0].total
     }
 
+    /// The same of a layer, by its index in [`names`].
+    pub(super) fn error_of(&self, layer: usize) -> f64 {
+        let sum: f64 = self.repeats.iter().map(|r| r.errors[layer]).sum();
+        sum / self.repeats.len() as f64
+    }
+
     /// Index of its setting.
     pub(super) fn setting(&self) -> usize {
         self.index
     }
-}
-
-/// A curve: what a method makes of its time.
-#[derive(Clone, Debug, Serialize)]
-pub struct Curve {
-    /// Name of the method.
-    pub method: String,
-    /// Slope of error over time in logarithms: −1 halves the error in twice the time.
-    pub slope: Option<Interval>,
-    /// For each of the levels of the report: seconds to reach it.
-    pub times: Vec<Level>,
-}
-
-/// A method and a level.
-#[derive(Clone, Debug, Serialize)]
-pub struct Level {
-    /// Relative mean squared error.
-    pub error: f64,
-    /// Seconds, where the curve passes the level.
-    pub seconds: Option<Interval>,
-    /// Seconds of its first point, where that is below the level already.
-    pub at_most: Option<f64>,
-    /// Seconds of its last point, where that is above the level still.
-    pub more_than: Option<f64>,
-    /// Seconds of the first method over seconds of this one.
-    pub ratio: Option<Interval>,
-    /// Where one of the two is only bounded: what this ratio is at least.
-    pub ratio_at_least: Option<f64>,
-    /// Whether this ratio is told from 1: beyond its interval and beyond the noise floor.
-    pub differs: bool,
 }
 
 /// A change and what it does, as factors.
@@ -181,6 +166,12 @@ impl Errors {
         mean(&self.raw[0])
     }
 
+    /// Errors of all layers in one repeat, without the reference's `own`.
+    fn of(&self, repeat: usize, own: &[f64]) -> Vec<f64> {
+        let layers = self.raw.iter().zip(own);
+        layers.map(|(raw, own)| raw[repeat] - own).collect()
+    }
+
     fn layers(&self, own: &[f64]) -> Vec<LayerError> {
         names()
             .into_iter()
@@ -219,7 +210,8 @@ fn point(study: &Study, setting: usize, scale: &Scale) -> Point {
     let s = &study.settings[setting];
     let runs = of_setting(study, setting);
     let reference = &study.reference;
-    let layers = errors(&runs, &reference.layers, scale).layers(&reference.error);
+    let errors = errors(&runs, &reference.layers, scale);
+    let layers = errors.layers(&reference.error);
     let seconds: Vec<f64> = runs.iter().map(|r| study.clock.of(r)).collect();
     let compared: Vec<_> = runs
         .iter()
@@ -234,11 +226,13 @@ fn point(study: &Study, setting: usize, scale: &Scale) -> Point {
             .compare(study.exposure)
         })
         .collect();
-    let total = |r: &&Run| scale.rel_mse(r.layers.beauty(), reference.layers.beauty());
-    let repeats = runs
+    let repeats = seconds
         .iter()
-        .zip(&seconds)
-        .map(|(r, t)| (*t, total(r) - reference.error[0]))
+        .enumerate()
+        .map(|(i, &seconds)| Repeat {
+            seconds,
+            errors: errors.of(i, &reference.error),
+        })
         .collect();
     let flip: Option<Vec<f64>> = compared.iter().map(|c| c.flip).collect();
     let trimmed: Vec<f64> = compared.iter().map(|c| c.rel_mse_trimmed).collect();
@@ -269,18 +263,18 @@ fn point(study: &Study, setting: usize, scale: &Scale) -> Point {
     }
 }
 
-/// Factors between two settings, repeat by repeat: of seconds, of errors, of both.
-fn factors(a: &Point, b: &Point) -> [Option<Interval>; 3] {
+/// Factors between two settings, repeat by repeat: of seconds, of errors in a layer, of both.
+pub(super) fn factors(a: &Point, b: &Point, layer: usize) -> [Option<Interval>; 3] {
     let n = a.repeats.len().min(b.repeats.len());
     let time = |p: &[usize]| {
         let logs: Vec<f64> = p
             .iter()
-            .map(|&i| (b.repeats[i].0 / a.repeats[i].0).ln())
+            .map(|&i| (b.repeats[i].seconds / a.repeats[i].seconds).ln())
             .collect();
         Some(median(&logs))
     };
     let error = |p: &[usize]| {
-        let sum = |q: &Point| p.iter().map(|&i| q.repeats[i].1).sum::<f64>();
+        let sum = |q: &Point| p.iter().map(|&i| q.repeats[i].errors[layer]).sum::<f64>();
         let (x, y) = (sum(a), sum(b));
         (x > 0.0 && y > 0.0).then(|| (y / x).ln())
     };
@@ -288,7 +282,7 @@ fn factors(a: &Point, b: &Point) -> [Option<Interval>; 3] {
     [bootstrap(n, time), bootstrap(n, error), bootstrap(n, both)].map(|i| i.map(exp))
 }
 
-fn exp(i: Interval) -> Interval {
+pub(super) fn exp(i: Interval) -> Interval {
     Interval {
         value: i.value.exp(),
         low: i.low.exp(),
@@ -297,7 +291,7 @@ fn exp(i: Interval) -> Interval {
 }
 
 /// Whether a factor is told from 1.
-fn differs(i: &Interval, floor: f64) -> bool {
+pub(super) fn differs(i: &Interval, floor: f64) -> bool {
     !i.contains(1.0) && i.value.ln().abs() > floor.ln()
 }
 
@@ -309,12 +303,10 @@ pub(super) fn analyse(study: &Study) -> Analysis {
         .collect();
     let kind = |p: &Point| study.settings[p.index].kind;
     let twin = |second: bool| all.iter().find(|p| kind(p) == Kind::Again(second));
-    let floor = match (twin(false), twin(true)) {
-        (Some(a), Some(b)) => factors(a, b).map(|i| {
-            // Whichever way chance went, it could have gone the other way.
-            i.map_or(1.0, |i| i.high.max(1.0 / i.low.max(1e-9)))
-        }),
-        _ => [1.0; 3],
+    let twins = twin(false).zip(twin(true));
+    let floors = match twins {
+        Some((a, b)) => factors(a, b, 0).map(|f| floor(&f)),
+        None => [1.0; 3],
     };
     let base = all.iter().find(|p| kind(p) == Kind::Base);
     let effects = all
@@ -324,7 +316,7 @@ pub(super) fn analyse(study: &Study) -> Analysis {
             _ => None,
         })
         .filter_map(|(c, p)| {
-            let [time, error, cost] = factors(base?, p);
+            let [time, error, cost] = factors(base?, p, 0);
             let all = [time?, error?, cost?];
             Some(Effect {
                 change: CHANGES[c].name,
@@ -332,27 +324,22 @@ pub(super) fn analyse(study: &Study) -> Analysis {
                 time: all[0],
                 error: all[1],
                 cost: all[2],
-                differs: std::array::from_fn(|k| differs(&all[k], floor[k])),
+                differs: std::array::from_fn(|k| differs(&all[k], floors[k])),
             })
         })
         .collect();
-    let levels = levels(&all);
     let of_method = |m: usize| -> Vec<&Point> {
         all.iter()
             .filter(|p| matches!(kind(p), Kind::Rung { method, .. } if method == m))
             .collect()
     };
     let ladders: Vec<Vec<&Point>> = (0..study.methods.len()).map(of_method).collect();
-    let curves = ladders
-        .iter()
-        .zip(&study.methods)
-        .map(|(ladder, method)| curve(method, ladder, &ladders[0], &levels, floor[2]))
-        .collect();
+    let curves = curves(&study.methods, &ladders, &study.reference.error, twins);
     let base = base.map(describe);
     let shown = |p: &Point| !matches!(kind(p), Kind::Again(_));
     let points = all.iter().filter(|p| shown(p)).cloned().collect();
     Analysis {
-        floor,
+        floor: floors,
         points,
         curves,
         effects,
@@ -368,92 +355,4 @@ pub(super) fn describe(p: &Point) -> String {
         out += &format!(", {n} photons, {k} in a kernel");
     }
     out
-}
-
-/// Levels of error, 1 and 3 of each power of ten, that some curve passes.
-fn levels(points: &[Point]) -> Vec<f64> {
-    let errors = || {
-        points
-            .iter()
-            .filter(|p| p.rung.is_some())
-            .map(|p| p.error().value)
-    };
-    let (lo, hi) = errors()
-        .filter(|e| *e > 0.0)
-        .fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| {
-            (lo.min(e), hi.max(e))
-        });
-    (-7..=2)
-        .flat_map(|p| [1.0, 3.0].map(|m| m * 10_f64.powi(p)))
-        .filter(|l| (lo..hi).contains(l))
-        .collect()
-}
-
-/// Time and error of a ladder over some of the repeats.
-fn over(ladder: &[&Point], picks: &[usize]) -> Vec<(f64, f64)> {
-    ladder
-        .iter()
-        .map(|p| {
-            let t: Vec<f64> = picks.iter().map(|&i| p.repeats[i].0).collect();
-            let e = picks.iter().map(|&i| p.repeats[i].1).sum::<f64>() / picks.len() as f64;
-            (median(&t), e)
-        })
-        .collect()
-}
-
-fn curve(
-    method: &Method,
-    ladder: &[&Point],
-    first: &[&Point],
-    levels: &[f64],
-    floor: f64,
-) -> Curve {
-    let n = ladder.iter().map(|p| p.repeats.len()).min().unwrap_or(0);
-    let all: Vec<usize> = (0..n).collect();
-    let logs = |picks: &[usize]| {
-        let points: Vec<(f64, f64)> = over(ladder, picks)
-            .into_iter()
-            .filter(|p| p.1 > 0.0)
-            .map(|(t, e)| (t.ln(), e.ln()))
-            .collect();
-        slope(&points)
-    };
-    let times = levels.iter().map(|&error| {
-        let time = |of: &[&Point], picks: &[usize]| reach(&over(of, picks), error);
-        let log = |of: &[&Point], picks: &[usize]| time(of, picks).known().map(f64::ln);
-        let ratio = bootstrap(n, |p| Some(log(first, p)? - log(ladder, p)?)).map(exp);
-        let [of_first, mine] = [first, ladder].map(|of| time(of, &all));
-        let last = |of: &[&Point]| over(of, &all).last().map(|p| p.0);
-        // From below for the first method, from above for this one.
-        let slow = match of_first {
-            Reach::At(t) => Some(t),
-            Reach::Never => last(first),
-            Reach::Before(_) => None,
-        };
-        let fast = match mine {
-            Reach::At(t) | Reach::Before(t) => Some(t),
-            Reach::Never => None,
-        };
-        let bound = slow.zip(fast).map(|(s, f)| s / f);
-        Level {
-            error,
-            seconds: bootstrap(n, |p| log(ladder, p)).map(exp),
-            at_most: match mine {
-                Reach::Before(t) => Some(t),
-                _ => None,
-            },
-            more_than: match mine {
-                Reach::Never => last(ladder),
-                _ => None,
-            },
-            differs: ratio.as_ref().is_some_and(|r| differs(r, floor)),
-            ratio_at_least: bound.filter(|b| ratio.is_none() && *b > floor),
-            ratio,
-        }
-    });
-    Curve {
-        method: method.name.clone(),
-        slope: bootstrap(n, logs),
-        times: times.collect(),
-    }
 }

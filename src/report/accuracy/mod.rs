@@ -7,6 +7,7 @@
 //! not over pixels, which share photons.
 
 mod analysis;
+mod curves;
 mod layers;
 mod measure;
 mod methods;
@@ -16,7 +17,8 @@ mod precision;
 mod reference;
 mod tables;
 
-pub use analysis::{Analysis, Curve, Effect, LayerError, Level, Point};
+pub use analysis::{Analysis, Effect, LayerError, Point};
+pub use curves::{Curve, LayerTimes, Level};
 pub use layers::Layers;
 pub use measure::{Kind, Run, Setting};
 pub use methods::{CHANGES, Change, Method, methods};
@@ -24,7 +26,7 @@ pub use page::page;
 pub use plots::overview;
 pub use precision::with_measured_backends;
 pub use reference::Reference;
-pub use tables::{csv, json, markdown, text};
+pub use tables::{csv, json, markdown, text, times_csv};
 
 use std::path::PathBuf;
 

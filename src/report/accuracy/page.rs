@@ -6,7 +6,8 @@ use std::io::Cursor;
 use base64::Engine;
 
 use super::analysis::describe;
-use super::tables::{changes, interval, ratio, seconds, short};
+use super::curves::{components, whole};
+use super::tables::{COMPONENTS, changes, interval, ratio, seconds, short};
 use super::{Analysis, Circumstances, Point, Study, layers, plots};
 use crate::error::Result;
 use crate::film::{Channel, Image, Layer};
@@ -95,13 +96,16 @@ fn times(analysis: &Analysis) -> String {
     let mut out = String::from("<h2>Time to an error</h2>\n<table>\n");
     let faster = format!("times faster than {first}");
     out += &head(&["method", "relMSE", "seconds", &faster]);
-    for c in &analysis.curves {
-        for l in &c.times {
-            let cells = [c.method.clone(), short(l.error), seconds(l), ratio(l)];
-            out += &row(cells, "td");
-        }
+    for r in whole(&analysis.curves) {
+        let l = r.level;
+        out += &row(
+            [r.method.into(), short(l.error), seconds(l), ratio(l)],
+            "td",
+        );
     }
-    out += "</table>\n<table>\n";
+    out += "</table>\n";
+    out += &of_components(analysis, &faster);
+    out += "<table>\n";
     out += &head(&["method", "slope of error over time"]);
     for c in &analysis.curves {
         let slope = c.slope.as_ref().map_or("unknown".into(), interval);
@@ -116,6 +120,22 @@ fn times(analysis: &Analysis) -> String {
          time, {e} of error, {both} of their product. A slope of −1 halves the error in twice the \
          time.</p>\n"
     )
+}
+
+fn of_components(analysis: &Analysis, faster: &str) -> String {
+    let parts = components(&analysis.curves);
+    if parts.is_empty() {
+        return String::new();
+    }
+    let mut out = format!("<p>{COMPONENTS}</p>\n<table class=\"components\">\n");
+    out += &head(&["component", "method", "relMSE", "seconds", faster]);
+    for r in parts {
+        let l = r.level;
+        let (error, time, ratio) = (short(l.error), seconds(l), ratio(l));
+        let cells = [r.layer.into(), r.method.into(), error, time, ratio];
+        out += &row(cells, "td");
+    }
+    out + "</table>\n"
 }
 
 fn points(analysis: &Analysis) -> String {

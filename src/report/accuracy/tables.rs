@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
+use super::curves::{Row, components, whole};
 use super::{Analysis, Circumstances, Effect, Level, Study};
 use crate::report::statistics::Interval;
 
@@ -48,6 +49,10 @@ pub(super) fn ratio(l: &Level) -> String {
     }
 }
 
+/// What the table of components shows.
+pub(super) const COMPONENTS: &str = "Seconds of the whole picture until the error of one component, \
+     divided by the whole reference, is as small:";
+
 /// The answer in a few lines.
 pub fn text(analysis: &Analysis) -> String {
     let mut out = String::new();
@@ -72,6 +77,24 @@ pub fn text(analysis: &Analysis) -> String {
             let _ = writeln!(out, "{:<18} {:>9} {:>28}", c.method, "slope", interval(s));
         }
     }
+    let parts = components(&analysis.curves);
+    if !parts.is_empty() {
+        let _ = writeln!(
+            out,
+            "seconds of the whole picture until one component is good"
+        );
+    }
+    for r in parts {
+        let _ = writeln!(
+            out,
+            "{:<10} {:<22} {:>9} {:>28} {:>28}",
+            r.layer,
+            r.method,
+            short(r.level.error),
+            seconds(r.level),
+            ratio(r.level)
+        );
+    }
     let [t, e, both] = analysis.floor.map(|f| 100.0 * (f - 1.0));
     let _ = writeln!(
         out,
@@ -90,18 +113,31 @@ pub fn markdown(analysis: &Analysis) -> String {
         &format!("faster than {first}"),
     ]);
     out += &line(["---"; 4]);
-    let levels = analysis.curves.first().map_or(0, |c| c.times.len());
-    // By error, so that methods stand beside each other.
-    for k in 0..levels {
-        for c in &analysis.curves {
-            let l = &c.times[k];
-            out += &line([&short(l.error), &c.method, &seconds(l), &ratio(l)]);
-        }
+    for r in whole(&analysis.curves) {
+        let l = r.level;
+        out += &line([&short(l.error), r.method, &seconds(l), &ratio(l)]);
     }
     let [t, e, both] = analysis.floor.map(|f| 100.0 * (f - 1.0));
     out += &format!(
         "\nNoise floor: {t:.0} % of time, {e:.0} % of error, {both:.0} % of their product.\n"
     );
+    let parts = components(&analysis.curves);
+    if !parts.is_empty() {
+        out += &format!("\n{COMPONENTS}\n\n");
+        out += &line([
+            "component",
+            "relMSE",
+            "method",
+            "seconds",
+            &format!("faster than {first}"),
+        ]);
+        out += &line(["---"; 5]);
+    }
+    for r in parts {
+        let l = r.level;
+        let cells = [r.layer, &short(l.error), r.method, &seconds(l), &ratio(l)];
+        out += &line(cells);
+    }
     let Some(base) = analysis
         .base
         .as_ref()
@@ -168,6 +204,39 @@ pub fn csv(analysis: &Analysis) -> String {
                 flip.map_or(",,".into(), |f| format!("{},{},{}", f.value, f.low, f.high))
             );
         }
+    }
+    out
+}
+
+/// One line per layer, level and method: seconds to an error.
+pub fn times_csv(analysis: &Analysis) -> String {
+    let mut out = String::from(
+        "layer,relmse,method,seconds,seconds_low,seconds_high,at_most,more_than,ratio,ratio_low,\
+         ratio_high,ratio_at_least,differs\n",
+    );
+    let curves = &analysis.curves;
+    for r in whole(curves).into_iter().chain(components(curves)) {
+        let Row {
+            layer, level: l, ..
+        } = r;
+        let triple = |i: Option<Interval>| {
+            i.map_or(",,".into(), |i| format!("{},{},{}", i.value, i.low, i.high))
+        };
+        let single = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            out,
+            "{},{},{},{},{},{},{},{},{}",
+            if layer.is_empty() { "all" } else { layer },
+            l.error,
+            r.method,
+            triple(l.seconds),
+            single(l.at_most),
+            single(l.more_than),
+            triple(l.ratio),
+            single(l.ratio_at_least),
+            l.differs
+        );
     }
     out
 }
