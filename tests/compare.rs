@@ -14,7 +14,9 @@ use dualight::accel::{ACCELERATORS, Accelerator, BuildStats, Class, CrossCheck};
 use dualight::cameras::CAMERAS;
 use dualight::color::Rgb;
 use dualight::control::Control;
-use dualight::geometry::{Geometry, Hit, Ray, TriangleMesh};
+use dualight::geometry::{
+    Geometry, Hit, MaterialId, Object, ObjectId, Ray, Shape, ShapeId, TriangleMesh,
+};
 use dualight::materials::{AlphaMode, MaterialDesc};
 use dualight::math::{DAffine3, DQuat, DVec3};
 use dualight::photons::{EMISSIONS, EmissionContext, Purpose};
@@ -208,6 +210,56 @@ impl Accelerator for Saboteur {
 
     fn stats(&self) -> BuildStats {
         self.inner.stats()
+    }
+}
+
+/// The end of a needle, a millimetre wide, from 17 km away: its corners as seen from there are
+/// rounded by as much as it is large, so it may lie any way round, and the line of an edge pass
+/// anywhere. Embree met it by a ray that passes 0.19 m beside it.
+#[test]
+fn what_is_smaller_than_rounding_has_edges_that_turn() {
+    let mut geometry = Geometry::default();
+    geometry.shapes.push(Shape::Mesh(TriangleMesh {
+        positions: vec![
+            [-0.375_318_56, 0.599_335_9, -0.002_803_29],
+            [-0.375_119_9, 0.599_335_9, -0.001_823_22],
+            [-0.375_022_05, 0.600_330_9, -0.001_843_06],
+        ],
+        indices: vec![[0, 1, 2]],
+        ..Default::default()
+    }));
+    geometry.objects.push(Object {
+        shape: ShapeId(0),
+        placement: None,
+        material: MaterialId(0),
+        light: None,
+        name: "needle".into(),
+        coverage: None,
+    });
+    let geometry = Arc::new(geometry);
+    let subject = Saboteur {
+        inner: build("embree", &geometry),
+        bug: |_, _| {
+            Some(Hit {
+                t: 1.0,
+                u: 0.73,
+                v: 0.07,
+                prim: 0,
+                object: ObjectId(0),
+            })
+        },
+    };
+    let check = CrossCheck {
+        geometry: &geometry,
+        subject: &subject,
+        reference: &*build("bvh", &geometry),
+    };
+    let beside = DVec3::new(-0.375, 0.4, -0.001_953);
+    let way = DVec3::new(7_288.525_9, 5_103.075_7, 14_590.812_5);
+    for (distance, wrong) in [(1.0, false), (1e-4, true)] {
+        let way = way * distance;
+        let finding = check.intersect(&Ray::new(beside + way, -way));
+        assert_eq!(finding.class == Class::Unexplained, wrong, "{finding:?}");
     }
 }
 

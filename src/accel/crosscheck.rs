@@ -301,7 +301,8 @@ struct Passage {
     /// Which of a sphere's intersections: 0 where the ray enters; 0 for a triangle.
     root: u8,
     /// Depth inside the outline as seen along the ray, in metres; negative outside. Of a
-    /// triangle, inside the lines through its edges: that is what backends compute.
+    /// triangle, inside the lines through its edges: that is what backends compute. Outside of an
+    /// edge's ends in units of how far its line moves there if they move by a metre.
     depth: f64,
     /// Bound `δ` on the rounding of positions, in metres.
     slack: f64,
@@ -388,7 +389,10 @@ fn triangle(o: DVec3, d: DVec3, v: [DVec3; 3], t_backend: f64, terms: f64) -> Pa
         let width = along.length();
         // An edge seen end-on is a point, which either side may be of.
         if width > 0.0 {
-            p.cross(along).dot(unit) / width
+            // Ends that move turn the line of a short edge: beyond them it moves by so much more.
+            let at = -p.dot(along) / width;
+            let beyond = (-at).max(at - width).max(0.0);
+            p.cross(along).dot(unit) / (width * (1.0 + 2.0 * beyond / width))
         } else {
             0.0
         }
