@@ -139,16 +139,23 @@ fn the_flux_of_every_light_is_exact() {
             let scene = balls(kind, mesh);
             let accel = accelerator(&scene.geometry);
             let told = (3, Purpose::Global, 20_000);
-            let (sum, n, cells) = with_source("adaptive", &scene, &*accel, told, |s| {
-                let sum: Rgb = photons(s).map(|p| p.power).sum();
-                (sum, s.len(), s.cells())
+            let cells = ["adaptive", "adaptive-linear"].map(|name| {
+                let (sum, n, cells) = with_source(name, &scene, &*accel, told, |s| {
+                    let sum: Rgb = photons(s).map(|p| p.power).sum();
+                    (sum, s.len(), s.cells())
+                });
+                let flux = scene.flux();
+                let off = (sum - flux).map(f64::abs).max_channel() / flux.max_channel();
+                println!(
+                    "{name}, {kind}, mesh {mesh}: {n} photons, {cells} cells, flux off by {off:.1e}"
+                );
+                assert!(off < 1e-9, "{off}");
+                // One photon per cell at least, and yet no more than were asked for.
+                assert!((19_999..=20_001).contains(&n), "{n}");
+                cells
             });
-            let flux = scene.flux();
-            let off = (sum - flux).map(f64::abs).max_channel() / flux.max_channel();
-            println!("{kind}, mesh {mesh}: {n} photons, {cells} cells, flux off by {off:.1e}");
-            assert!(off < 1e-9, "{off}");
-            // One photon per cell at least, and yet no more than were asked for.
-            assert!((19_999..=20_001).contains(&n), "{n}");
+            // A forecast that sees fewer edges splits fewer cells.
+            assert!(cells[1] <= cells[0], "{cells:?}");
         }
     }
 }
