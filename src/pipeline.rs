@@ -1,15 +1,18 @@
 //! From a scene to an image: one call per stage, each with its time.
 
+mod clock;
 mod foreseen;
+mod photon_file;
 mod progressive;
 
+pub use photon_file::{PhotonFile, load_photons, save_photons};
 pub use progressive::{Progressive, Session, Standing};
 
-use std::time::Instant;
-
+use clock::Clock;
 use foreseen::{hindrance, plan_layer};
 use progressive::Forecast;
 
+use crate::accel::{Accelerator, Guarded};
 use crate::cameras::{framing, with_lens};
 use crate::control::{Control, Stopped};
 use crate::effects::{self, Decision, EffectSet};
@@ -17,13 +20,15 @@ use crate::error::{Error, Result};
 use crate::film::{Component, Film};
 use crate::integrators::{
     IntegratorSettings, PhotonNeeds, PixelPlan, Region, RenderContext, Spacing, Visibility,
-    camera_pass, guarded, planned_camera_pass,
+    camera_pass, enclosed, planned_camera_pass,
 };
-use crate::photons::{PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons};
+use crate::photons::{
+    PhotonKey, PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons,
+};
 use crate::plugins::Registry;
 use crate::sampling::hash2;
 use crate::scene::Scene;
-use crate::stats::{PhotonCounts, RayCounts, StageTime, Statistics, peak_memory};
+use crate::stats::{PhotonCounts, RayCounts, Statistics, peak_memory};
 
 /// How camera samples are shared among pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -128,6 +133,7 @@ pub fn render(
         film: None,
         seconds: 0.0,
         watch: &mut |_, _| {},
+        photons: None,
     };
     render_session(scene, settings, registry, control, session)
 }
@@ -234,6 +240,20 @@ fn render_in_pool(
         ));
     }
     let not_interpolated = hindrance(adaptive, settings.interpolation, effects.set);
+    if session.photons.is_some() && settings.progressive.is_some() {
+        return Err(Error::Usage(
+            "independent passes have photons of their own, each other ones; leave out the file of \
+             photons"
+                .into(),
+        ));
+    }
+    let gather = options.gather_rays > 0 || integrator.photons == PhotonNeeds::Caustic;
+    let photons = integrator.photons != PhotonNeeds::None;
+    let kept = session.photons.filter(|_| photons).map(|file| {
+        let backend = backend.name;
+        let key = PhotonKey::new(scene, backend, emission, effects.set, &first, gather);
+        (file, key)
+    });
     let mut plan: Option<PixelPlan> = None;
     let mut rays = RayCounts::default();
     let [mut global_photons, mut caustic_photons] = [PhotonCounts::default(); 2];
@@ -255,8 +275,18 @@ fn render_in_pool(
         (done, session.seconds),
     );
     let mut standing = forecast.standing(&film, done, true);
-    let accel = guarded(accel, scene, &*camera, &spacing, options.seed);
-    let visibility = Visibility::learn(scene, &*accel, &*camera, &spacing, options.seed);
+    // Photons are traced without the guard: they must not depend on the camera, and of those that
+    // leave through a crack nobody sees that they are missing. Not where surfaces are there by chance,
+    // which would be tried again.
+    let unguarded = &*accel;
+    let guard = Guarded::new(unguarded);
+    let leaky = !accel.watertight() && scene.geometry.is_whole();
+    let accel: &dyn Accelerator =
+        match leaky && enclosed(scene, unguarded, &*camera, &spacing, options.seed) {
+            true => &guard,
+            false => unguarded,
+        };
+    let visibility = Visibility::learn(scene, accel, &*camera, &spacing, options.seed);
     while done < settings.spp && control.stopped().is_none() && !standing.reached(target) {
         let mut samples = settings.spp - done;
         let mut maps = PhotonMaps::default();
@@ -267,25 +297,28 @@ fn render_in_pool(
         if wanted || in_passes {
             samples = samples.min(pass.samples);
         }
-        if wanted {
-            let gather = options.gather_rays > 0 || integrator.photons == PhotonNeeds::Caustic;
-            maps = trace_photons(
-                scene,
-                &*accel,
-                emission,
-                effects.set,
-                &pass.photons,
-                gather,
-                inner,
-            );
+        if wanted || kept.is_some() {
+            let trace = || {
+                let photons = &pass.photons;
+                trace_photons(
+                    scene,
+                    unguarded,
+                    emission,
+                    effects.set,
+                    photons,
+                    gather,
+                    inner,
+                )
+            };
+            let kept = kept.as_ref().filter(|_| passes == 0);
+            maps = photon_file::obtain(kept, trace, &mut clock, control)?;
             global_photons.add_pass(&maps.global_counts, passes);
             caustic_photons.add_pass(&maps.caustic_counts, passes);
             rays.add(&maps.rays);
-            clock.split("photons", maps.tracing, "photon maps");
         }
         let context = RenderContext {
             scene,
-            accel: &*accel,
+            accel,
             visibility: &visibility,
             maps: &maps,
             effects: effects.set,
@@ -441,49 +474,4 @@ fn region(settings: &RenderSettings) -> Result<Region> {
         )));
     }
     Ok(Region { x0, y0, x1, y1 })
-}
-
-/// Takes the time of stages that follow one another.
-struct Clock {
-    last: Instant,
-    laps: Vec<StageTime>,
-}
-
-impl Default for Clock {
-    fn default() -> Self {
-        Self {
-            last: Instant::now(),
-            laps: Vec::new(),
-        }
-    }
-}
-
-impl Clock {
-    /// As [`lap`](Self::lap), for two stages of which the first took `seconds`.
-    fn split(&mut self, first: &'static str, seconds: f64, second: &'static str) {
-        let all = self.restart();
-        self.add(first, seconds.min(all));
-        self.add(second, (all - seconds).max(0.0));
-    }
-
-    /// Books the time since the last call.
-    fn lap(&mut self, stage: &'static str) {
-        let seconds = self.restart();
-        self.add(stage, seconds);
-    }
-
-    fn restart(&mut self) -> f64 {
-        let now = Instant::now();
-        let seconds = (now - self.last).as_secs_f64();
-        self.last = now;
-        seconds
-    }
-
-    /// Stages that come again are one.
-    fn add(&mut self, stage: &'static str, seconds: f64) {
-        match self.laps.iter_mut().find(|s| s.stage == stage) {
-            Some(lap) => lap.seconds += seconds,
-            None => self.laps.push(StageTime { stage, seconds }),
-        }
-    }
 }

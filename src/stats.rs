@@ -1,6 +1,6 @@
 //! What a run counted and how long its stages took; written as JSON.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Rays traced, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -38,7 +38,7 @@ impl RayCounts {
 }
 
 /// What became of the photons of one map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhotonCounts {
     /// Photons that left lights.
     pub emitted: u64,

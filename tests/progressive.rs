@@ -59,6 +59,7 @@ fn render(
         film,
         seconds: 0.0,
         watch: &mut watch,
+        photons: None,
     };
     pipeline::render_session(scene(), settings, registry(), control, session).unwrap()
 }

@@ -5,6 +5,8 @@
 //! scene is the second question cheap: whoever puts the guard on has found out before. Where
 //! light may leave anyway, a lost ray in millions is not seen.
 
+use std::ops::Deref;
+
 use super::{Accelerator, BuildStats};
 use crate::geometry::{Hit, Ray};
 use crate::math::robust::UNIT_ROUNDOFF;
@@ -13,15 +15,15 @@ use crate::math::robust::UNIT_ROUNDOFF;
 /// is lost is lost within few of them.
 const ASIDE: [f64; 2] = [4.0, -16.0];
 
-/// A backend that asks again.
-pub struct Guarded {
-    inner: Box<dyn Accelerator>,
+/// A backend that asks again, its own or a borrowed one.
+pub struct Guarded<A> {
+    inner: A,
 }
 
-impl Guarded {
+impl<A: Deref<Target: Accelerator>> Guarded<A> {
     /// Guards a backend. Not for scenes with surfaces that are not whole, where a ray that asks
     /// again would have a second chance.
-    pub fn new(inner: Box<dyn Accelerator>) -> Self {
+    pub fn new(inner: A) -> Self {
         Self { inner }
     }
 
@@ -43,7 +45,7 @@ impl Guarded {
     }
 }
 
-impl Accelerator for Guarded {
+impl<A: Deref<Target: Accelerator> + Send + Sync> Accelerator for Guarded<A> {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.inner.intersect(ray).or_else(|| self.again(ray))

@@ -236,6 +236,19 @@ pub struct RenderArgs {
     /// How photons leave the lights [see dualight plugins]
     #[arg(long, value_name = "NAME", help_heading = "Photons")]
     pub emission: Option<String>,
+    /// Keep the photon maps in FILE. An image of more than 16 samples per pixel takes new photons
+    /// now and then; kept are the first
+    #[arg(
+        long,
+        value_name = "FILE",
+        help_heading = "Photons",
+        conflicts_with = "load_photons"
+    )]
+    pub save_photons: Option<PathBuf>,
+    /// Take the photon maps from FILE instead of tracing photons: same scene and settings, any
+    /// camera, and the same image to the bit
+    #[arg(long, value_name = "FILE", help_heading = "Photons")]
+    pub load_photons: Option<PathBuf>,
 
     /// Ray tracing backend [see dualight plugins]
     #[arg(long, value_name = "NAME", help_heading = "Machine")]

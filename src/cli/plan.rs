@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits, SolidGlass};
 use crate::integrators::{IntegratorSettings, PhotonNeeds, suited};
 use crate::output::{self, OutputSettings};
-use crate::pipeline::{PixelSampling, Progressive, RenderSettings};
+use crate::pipeline::{PhotonFile, PixelSampling, Progressive, RenderSettings};
 use crate::plugins::Registry;
 use crate::scene::{Omit, Scene};
 
@@ -55,6 +55,8 @@ pub struct Plan {
     pub write_every: Duration,
     /// Where the film is kept, if anywhere.
     pub resume: Option<PathBuf>,
+    /// Where photons are kept, if anywhere.
+    pub photons: Option<PhotonFile>,
     /// Whether to print nothing but errors.
     pub quiet: bool,
     size: Option<Size>,
@@ -88,6 +90,19 @@ impl Plan {
                     .into(),
             ));
         }
+        let photons = match (&args.save_photons, &args.load_photons) {
+            (Some(path), _) => Some(PhotonFile::Save(path.clone())),
+            (None, Some(path)) => Some(PhotonFile::Load(path.clone())),
+            (None, None) => None,
+        };
+        if photons.is_some() && progressive(args).is_some() {
+            return Err(Error::Usage(
+                "--save-photons and --load-photons are for a known --spp, since each independent \
+                 pass has other photons; leave out --target-error, --time-limit, --write-every and \
+                 --resume"
+                    .into(),
+            ));
+        }
         let plan = Self {
             scene: args.scene.file.clone(),
             import: ImportOptions {
@@ -105,6 +120,7 @@ impl Plan {
             time_limit: args.time_limit,
             write_every: args.write_every.unwrap_or(WRITE_EVERY),
             resume: args.resume.clone(),
+            photons,
             quiet: args.quiet,
             size: args.size,
             settings: RenderSettings {
@@ -154,7 +170,8 @@ impl Plan {
             || a.caustic_photons.is_some()
             || a.nearest.is_some()
             || a.gather.is_some()
-            || a.emission.is_some();
+            || a.emission.is_some()
+            || self.photons.is_some();
         let (entry, why) = suited(&registry.integrators, scene, effects.set, photons)?;
         Ok((entry.name, why))
     }
@@ -171,6 +188,8 @@ impl Plan {
             ("--caustic-photons", photons && a.caustic_photons.is_some()),
             ("--nearest", photons && a.nearest.is_some()),
             ("--emission", photons && a.emission.is_some()),
+            ("--save-photons", photons && a.save_photons.is_some()),
+            ("--load-photons", photons && a.load_photons.is_some()),
         ]
         .into_iter()
         .filter_map(|(name, idle)| idle.then_some(name))

@@ -13,8 +13,10 @@ use crate::control::{Control, Stopped};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::import;
+use crate::integrators::PhotonNeeds;
 use crate::output;
-use crate::pipeline::{self, RenderSettings, Rendering, Session};
+use crate::photons::SAMPLES_PER_PASS;
+use crate::pipeline::{self, PhotonFile, RenderSettings, Rendering, Session};
 use crate::plugins::Registry;
 use crate::scene::Census;
 use crate::stats::StageTime;
@@ -51,6 +53,12 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
             console::say(format_args!("note: {note}"));
         }
         let needs = registry.integrators.find(integrator)?.photons;
+        if plan.photons.is_some() && needs != PhotonNeeds::None && settings.spp > SAMPLES_PER_PASS {
+            console::say(format_args!(
+                "note: the file of photons has those of the first {SAMPLES_PER_PASS} samples per \
+                 pixel; later samples get others, traced anew each time"
+            ));
+        }
         for option in plan.idle_options(needs) {
             console::say(format_args!(
                 "warning: {option} has no meaning for the integrator {integrator}"
@@ -74,6 +82,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
         seconds: earlier.as_ref().map_or(0.0, |c| c.seconds),
         film: earlier.map(|c| c.film),
         watch: &mut |film, standing| keeper.watch(film, standing),
+        photons: plan.photons.clone(),
     };
     let mut rendering = pipeline::render_session(&scene, &settings, &registry, &control, session)?;
     // Memory is wanted for the image now.
@@ -131,7 +140,10 @@ fn check_targets(plan: &Plan) -> Result<()> {
         Some(StatisticsTarget::File(path)) => Some(path),
         _ => None,
     });
-    let files = files.chain(&plan.resume);
+    let files = files.chain(&plan.resume).chain(match &plan.photons {
+        Some(PhotonFile::Save(path)) => Some(path),
+        _ => None,
+    });
     let real = |p: &Path| p.canonicalize().ok();
     let scene = real(&plan.scene);
     for path in files {

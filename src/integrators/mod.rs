@@ -19,7 +19,7 @@ pub use camera_pass::{Region, camera_pass};
 pub use footprint::Spacing;
 pub use pixel_plan::{PixelPlan, planned_camera_pass};
 pub use settings::IntegratorSettings;
-pub use trials::guarded;
+pub use trials::enclosed;
 pub use visibility::Visibility;
 
 use crate::accel::Accelerator;

@@ -1,7 +1,7 @@
 //! A few paths from the camera before rendering, to find out what a scene is like.
 
 use super::Spacing;
-use crate::accel::{Accelerator, Guarded};
+use crate::accel::Accelerator;
 use crate::cameras::Camera;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::math::Frame;
@@ -54,19 +54,16 @@ fn bounce(sp: &SurfacePoint, u: [f64; 2]) -> Ray {
     sp.spawn(Frame::from_normal(n).to_world(warp::cosine_hemisphere(u)))
 }
 
-/// Puts a guard against leaks on a backend that needs one, if rays hardly leave the scene.
-pub fn guarded(
-    accel: Box<dyn Accelerator>,
+/// Whether hardly any of the rays that a rendering traces from the camera on leaves the scene.
+pub fn enclosed(
     scene: &Scene,
+    accel: &dyn Accelerator,
     camera: &dyn Camera,
     spacing: &Spacing,
     seed: u64,
-) -> Box<dyn Accelerator> {
-    if accel.watertight() || !scene.geometry.is_whole() {
-        return accel;
-    }
+) -> bool {
     let (mut rays, mut left) = (0u32, 0u32);
-    walk(scene, &*accel, camera, spacing, seed, |met, _| {
+    walk(scene, accel, camera, spacing, seed, |met, _| {
         rays += 1;
         left += match met {
             None => 1,
@@ -78,8 +75,5 @@ pub fn guarded(
             Some(_) => 0,
         };
     });
-    match f64::from(left) <= LEAVING * f64::from(rays) {
-        true => Box::new(Guarded::new(accel)),
-        false => accel,
-    }
+    f64::from(left) <= LEAVING * f64::from(rays)
 }

@@ -58,6 +58,11 @@ impl SkyImage {
         self.height
     }
 
+    /// Radiance of all texels, row by row.
+    pub fn texels(&self) -> &[[f32; 3]] {
+        &self.texels
+    }
+
     fn texel(&self, x: i64, y: i64) -> Rgb {
         let x = x.rem_euclid(i64::from(self.width)) as usize;
         let y = y.clamp(0, i64::from(self.height) - 1) as usize;

@@ -21,6 +21,7 @@ mod ledger;
 pub mod map;
 mod photon;
 mod progress;
+mod saved;
 mod targets;
 mod trace;
 mod uniform;
@@ -32,6 +33,7 @@ pub use map::{IrradianceMap, PhotonMap};
 use map::{Pilot, Surroundings};
 pub use photon::{Photon, PhotonClass};
 pub use progress::{PhotonPass, SAMPLES as SAMPLES_PER_PASS};
+pub use saved::PhotonKey;
 pub use targets::Targets;
 pub use trace::{StoredPhotons, follow_photons};
 

@@ -1,10 +1,12 @@
 //! A stored photon.
 
+use serde::{Deserialize, Serialize};
+
 use crate::color::Rgb;
 use crate::math::{DVec3, Vec3};
 
 /// By which kind of path a photon came.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PhotonClass {
     /// Straight from the light: `L D`.
     Direct,
@@ -15,7 +17,7 @@ pub enum PhotonClass {
 }
 
 /// A photon that arrived at a diffuse surface; 36 bytes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Photon {
     /// Where, world space.
     pub p: [f32; 3],
@@ -68,7 +70,7 @@ impl Photon {
 }
 
 /// A unit normal as photons store it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct PackedNormal([i16; 2]);
 
 impl PackedNormal {

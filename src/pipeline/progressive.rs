@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::PhotonFile;
 use crate::film::Film;
 use crate::photons::{PhotonPass, PhotonSettings, SAMPLES_PER_PASS};
 
@@ -26,6 +27,8 @@ pub struct Session<'a> {
     pub seconds: f64,
     /// Sees the film now and then.
     pub watch: &'a mut (dyn FnMut(&Film, &Standing) + Send),
+    /// A file that photons are kept in; not with [`Progressive`].
+    pub photons: Option<PhotonFile>,
 }
 
 /// How far a rendering in passes is.

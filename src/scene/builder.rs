@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::bake;
 use super::emitters::{surface_light, vary};
+use super::fingerprint::Recipe;
 use super::{LightChoice, Media, Scene};
 use crate::cameras::CameraDesc;
 use crate::color::Rgb;
@@ -95,6 +96,7 @@ pub struct SceneBuilder {
     placements: Vec<MeshPlacement>,
     lights: Vec<LightDesc>,
     cameras: Vec<CameraDesc>,
+    recipe: Recipe,
     warnings: Vec<String>,
     notes: Vec<String>,
 }
@@ -196,6 +198,7 @@ impl SceneBuilder {
             desc.coverage(),
             medium,
         ));
+        self.recipe.add_material(entry.name, desc);
         self.features.push(desc.features());
         if let Some(slots) = &desc.textures {
             self.textures.extend(slots.iter().map(|(_, t)| t.clone()));
@@ -211,6 +214,7 @@ impl SceneBuilder {
     /// Adds a light without surface; its `scene` is filled in later.
     pub fn add_light(&mut self, desc: LightDesc) {
         if !(self.omit.environment && desc.kind == "environment") {
+            self.recipe.add_light(&desc);
             self.lights.push(desc);
         }
     }
@@ -277,6 +281,7 @@ impl SceneBuilder {
             center,
             warnings: self.warnings,
             notes: self.notes,
+            recipe: self.recipe,
             found: Default::default(),
         })
     }

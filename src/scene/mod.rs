@@ -4,12 +4,14 @@ mod bake;
 mod builder;
 mod census;
 mod emitters;
+mod fingerprint;
 mod light_choice;
 mod media;
 mod precision;
 
 pub use builder::{Emission, MeshPlacement, Omit, SceneBuilder, ScenePlugins};
 pub use census::Census;
+pub use fingerprint::Fingerprints;
 pub use light_choice::LightChoice;
 pub use media::{Crossing, Inside, Media};
 
@@ -59,6 +61,8 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// What was decided on the way, for the user.
     pub notes: Vec<String>,
+    /// What it was made from, for its fingerprints.
+    recipe: fingerprint::Recipe,
     /// What is found out about the geometry when it is first asked for.
     found: Found,
 }

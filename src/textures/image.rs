@@ -1,5 +1,6 @@
 //! A decoded image: the numbers of its file, and what they mean.
 
+use std::fmt;
 use std::sync::{LazyLock, OnceLock};
 
 use rayon::prelude::*;
@@ -53,17 +54,17 @@ impl Texels {
         }
     }
 
-    fn bytes(&self) -> usize {
+    /// The numbers as they lie in memory.
+    pub fn as_bytes(&self) -> &[u8] {
         match self {
-            Self::U8(v) => v.len(),
-            Self::U16(v) => 2 * v.len(),
-            Self::F32(v) => 4 * v.len(),
+            Self::U8(v) => v,
+            Self::U16(v) => bytemuck::cast_slice(v),
+            Self::F32(v) => bytemuck::cast_slice(v),
         }
     }
 }
 
 /// A decoded image, rows from the top.
-#[derive(Debug)]
 pub struct Image {
     width: u32,
     height: u32,
@@ -74,6 +75,17 @@ pub struct Image {
     extremes: OnceLock<[[f64; 4]; 2]>,
     /// Smaller sizes, by what the numbers mean.
     pyramids: [OnceLock<Pyramid>; 4],
+}
+
+impl fmt::Debug for Image {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Image")
+            .field("width", &self.width)
+            .field("height", &self.height)
+            .field("channels", &self.channels)
+            .field("depth", &self.depth())
+            .finish_non_exhaustive()
+    }
 }
 
 impl Image {
@@ -124,6 +136,11 @@ impl Image {
         self.height
     }
 
+    /// The numbers of all texels.
+    pub fn texels(&self) -> &Texels {
+        &self.texels
+    }
+
     /// Numbers per texel in the file: 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA.
     pub fn channels(&self) -> usize {
         self.channels
@@ -141,7 +158,7 @@ impl Image {
     /// Memory of the texels and of the smaller sizes that are there, in bytes.
     pub fn bytes(&self) -> usize {
         let pyramids = self.pyramids.iter().filter_map(OnceLock::get);
-        self.texels.bytes() + pyramids.map(Pyramid::bytes).sum::<usize>()
+        self.texels.as_bytes().len() + pyramids.map(Pyramid::bytes).sum::<usize>()
     }
 
     /// The texel in column `x` of row `y`, both within the image: linear red, green, blue and

@@ -5,6 +5,8 @@
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
+use serde::{Deserialize, Serialize};
+
 use super::{FLATNESS, NORMAL_AGREEMENT, Site};
 use crate::accel::Accelerator;
 use crate::geometry::Ray;
@@ -37,7 +39,7 @@ struct Sight {
 }
 
 /// A star-shaped polygon in the tangent plane of a site: a part of what can be seen and stood on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Clearing {
     /// Of each sector between neighbouring directions: how far it reaches along both.
     sectors: [[f32; 2]; DIRECTIONS],

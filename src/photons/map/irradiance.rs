@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::{Kernels, PhotonMap, Site};
 use crate::color::Rgb;
@@ -16,7 +17,7 @@ use crate::photons::PhotonClass;
 const BLOCK: usize = 1024;
 
 /// Irradiance at a point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct IrradianceSample {
     /// Irradiance in W/m².
     irradiance: [f32; 3],
@@ -37,8 +38,8 @@ impl IrradianceSample {
 /// Irradiance at the sites where kernels were decided.
 #[derive(Debug)]
 pub struct IrradianceMap {
-    kernels: Arc<Kernels>,
-    samples: Vec<IrradianceSample>,
+    pub(super) kernels: Arc<Kernels>,
+    pub(super) samples: Vec<IrradianceSample>,
 }
 
 impl IrradianceMap {

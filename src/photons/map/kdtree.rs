@@ -4,6 +4,8 @@
 //! Source: for the distance to a cell, built up axis by axis on the way down, Arya and Mount,
 //! *Algorithms for Fast Vector Quantization*, DCC 1993.
 
+use serde::{Deserialize, Serialize};
+
 use crate::math::Vec3;
 
 /// Items of a block. Their distances are computed side by side.
@@ -84,8 +86,8 @@ fn squared([x, y, z]: [f32; 3]) -> f32 {
 }
 
 /// A plane that splits a range of blocks.
-#[derive(Clone, Copy, Debug, Default)]
-struct Plane {
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Plane {
     at: f32,
     axis: u32,
 }
@@ -153,6 +155,28 @@ impl KdTree {
                 .collect(),
             planes,
         }
+    }
+
+    /// The planes that split; the rest follows from the items in the order of the tree.
+    pub(super) fn planes(&self) -> &[Plane] {
+        &self.planes
+    }
+
+    /// The tree that sorted `items` by these planes before; `None` if they are of another number.
+    pub(super) fn from_planes<T>(
+        planes: Vec<Plane>,
+        items: &[T],
+        position: impl Fn(&T) -> [f32; 3],
+    ) -> Option<Self> {
+        let fits =
+            planes.len() == items.len().div_ceil(WIDTH) && u32::try_from(items.len()).is_ok();
+        fits.then(|| Self {
+            blocks: items
+                .chunks(WIDTH)
+                .map(|c| Block::new(c, &position))
+                .collect(),
+            planes,
+        })
     }
 
     /// Position of item `i`.

@@ -9,6 +9,7 @@
 //! Progressive Photon Mapping*, ACM TOG 32(2), 2013.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::clearing::{Clearing, Plane, Surroundings};
 use super::nearest::Closest;
@@ -55,8 +56,8 @@ impl<'a> Kernel<'a> {
 }
 
 /// What was decided at a site.
-#[derive(Clone, Copy, Debug)]
-struct Decision {
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct Decision {
     ng: PackedNormal,
     radius: f32,
     /// Index of its clearing; open if there is none.
@@ -86,13 +87,13 @@ impl Decision {
 #[derive(Debug, Default)]
 pub struct Kernels {
     /// Where kernels were decided: the tree has the positions.
-    tree: KdTree,
+    pub(super) tree: KdTree,
     /// How far they may serve.
     limits: Limits,
-    decisions: Vec<Decision>,
-    clearings: Vec<Clearing>,
+    pub(super) decisions: Vec<Decision>,
+    pub(super) clearings: Vec<Clearing>,
     /// The radius where no pilot photon came.
-    widest: f32,
+    pub(super) widest: f32,
 }
 
 /// What kernels are decided by.
@@ -167,17 +168,28 @@ impl Pilot<'_> {
             })
             .collect();
         let tree = KdTree::build(&mut sites, |s| s.0.into());
-        Kernels {
-            limits: tree.limits(|i| sites[i].1.limit(), sites.len()),
-            tree,
-            decisions: sites.into_iter().map(|s| s.1).collect(),
-            clearings,
-            widest,
-        }
+        let decisions = sites.into_iter().map(|s| s.1).collect();
+        Kernels::new(tree, decisions, clearings, widest)
     }
 }
 
 impl Kernels {
+    /// Those of the sites in a tree.
+    pub(super) fn new(
+        tree: KdTree,
+        decisions: Vec<Decision>,
+        clearings: Vec<Clearing>,
+        widest: f32,
+    ) -> Self {
+        Self {
+            limits: tree.limits(|i| decisions[i].limit(), decisions.len()),
+            tree,
+            decisions,
+            clearings,
+            widest,
+        }
+    }
+
     /// Number of sites.
     pub fn len(&self) -> usize {
         self.decisions.len()

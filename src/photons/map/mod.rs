@@ -5,12 +5,14 @@ mod irradiance;
 mod kdtree;
 mod kernels;
 mod nearest;
+mod saved;
 
 pub use clearing::Surroundings;
 pub use irradiance::{IrradianceMap, IrradianceSample};
 pub use kdtree::{KdTree, Limits, Search, Within};
 pub use kernels::{Kernel, Kernels, Pilot};
 pub use nearest::Nearest;
+pub(super) use saved::{SavedKernels, SavedMap, SavedSamples};
 
 use std::f64::consts::PI;
 use std::sync::Arc;
