@@ -7,10 +7,11 @@
 //! make ([`windows`]), which is that of the noise they leave and of the bend they miss together. So
 //! both vanish as samples are added.
 //!
-//! Each half of the samples is averaged over windows that were chosen without it: windows that
-//! looked at the samples they average would stop before a rare bright one, and its light would be
-//! lost, 1 % of all in the box by paths. (Two halves for the same reason: Rousselle, Knaus and
-//! Zwicker, *Adaptive Rendering with Non-Local Means Filtering*, ACM TOG 31(6), 2012.)
+//! Each half of the samples is averaged over windows that were chosen by what windows over the
+//! other half say: those that went by the means they make themselves would stop before a rare
+//! bright sample, and its light would be lost, 1 % of all in the box by paths. (Two halves for the
+//! same reason: Rousselle, Knaus and Zwicker, *Adaptive Rendering with Non-Local Means Filtering*,
+//! ACM TOG 31(6), 2012.)
 //!
 //! Local planes in rendering: Moon, Carr and Yoon, *Adaptive Rendering Based on Weighted Local
 //! Regression*, ACM TOG 33(5), 2014.
