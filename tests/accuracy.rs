@@ -192,8 +192,9 @@ fn times_of_components_follow_their_own_errors() {
             passed += 1;
             let around = ladder.windows(2).find(|w| error(w[1]) <= l.error).unwrap();
             assert!(error(around[0]) > l.error);
-            let [from, to] = [around[0], around[1]].map(|p| p.seconds.value);
-            let within = from * (1.0 - 1e-9)..=to * (1.0 + 1e-9);
+            // On a busy machine the finer of two short renderings may take less time.
+            let [a, b] = [around[0], around[1]].map(|p| p.seconds.value);
+            let within = a.min(b) * (1.0 - 1e-9)..=a.max(b) * (1.0 + 1e-9);
             assert!(within.contains(&seconds.value), "{l:?}");
             let first = &analysis.curves[0].components[k].times[i].seconds;
             if let (Some(r), Some(first)) = (&l.ratio, first) {
