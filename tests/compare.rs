@@ -213,6 +213,38 @@ impl Accelerator for Saboteur {
     }
 }
 
+/// What is lost on a surface that is not whole is explained by its threshold only where that is.
+#[test]
+fn opacity_excuses_nothing_away_from_its_threshold() {
+    let material = MaterialDesc {
+        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+        vertex_colors: true,
+        ..lambert("veil", Rgb::splat(0.5))
+    };
+    let scene = of_sheets(21, &material, &[DAffine3::IDENTITY]);
+    let subject = Saboteur {
+        inner: build("embree", &scene.geometry),
+        bug: |_, _| None,
+    };
+    let check = CrossCheck {
+        geometry: &scene.geometry,
+        subject: &subject,
+        reference: &*build("bvh", &scene.geometry),
+    };
+    let mut rng = dualight::sampling::Rng::new(6);
+    let (mut lost, mut excused) = (0, 0);
+    for _ in 0..2000 {
+        let [x, y] = rng.next_2d();
+        let f = check.intersect(&Ray::new(DVec3::new(x - 0.5, y - 0.5, 3.0), -DVec3::Z));
+        if f.reference.is_some() {
+            lost += 1;
+            excused += u32::from(f.class != Class::Unexplained);
+        }
+    }
+    // The half of the sheet that is there; hardly a ray passes its edges within rounding.
+    assert!(lost > 900 && excused < 5, "{excused} of {lost}");
+}
+
 /// The end of a needle, a millimetre wide, from 17 km away: its corners as seen from there are
 /// rounded by as much as it is large, so it may lie any way round, and the line of an edge pass
 /// anywhere. Embree met it by a ray that passes 0.19 m beside it.

@@ -416,7 +416,7 @@ fn triangle(o: DVec3, d: DVec3, v: [DVec3; 3], t_backend: f64, terms: f64) -> Pa
         depth: least(1.0).max(least(-1.0)),
         slack,
         dt: in_plane / length,
-        barycentrics: [-e2.dot(m), e1.dot(m)],
+        barycentrics: [e2.dot(m), -e1.dot(m)],
         spread: [e2.length(), e1.length()].map(|e| (in_plane * e / area).min(1.0)),
         outline: "an edge",
     }
