@@ -81,9 +81,15 @@ type Explanation = (Class, &'static str, f64);
 impl CrossCheck<'_> {
     /// Asks both for the nearest hit.
     pub fn intersect(&self, ray: &Ray) -> Finding {
-        let (a, b) = (self.subject.intersect(ray), self.reference.intersect(ray));
-        let (class, reason, ratio) = self.explain(ray, a, b);
-        let distance = a.map_or(0.0, |a| Passage::new(self.geometry, ray, &a).error(&a));
+        self.judge(ray, self.reference.intersect(ray))
+    }
+
+    /// Asks the subject for the nearest hit, where the reference's is known.
+    pub fn judge(&self, ray: &Ray, b: Option<Hit>) -> Finding {
+        let a = self.subject.intersect(ray);
+        let passage = a.map(|a| Passage::new(self.geometry, ray, &a));
+        let (class, reason, ratio) = self.explain(ray, a.zip(passage), b);
+        let distance = a.zip(passage).map_or(0.0, |(a, p)| p.error(&a));
         Finding {
             class,
             hit: a.is_some(),
@@ -119,31 +125,36 @@ impl CrossCheck<'_> {
                     let reason = "one backend's two queries contradict each other";
                     (Class::Unexplained, reason, f64::INFINITY)
                 } else {
-                    self.explain(ray, finding.subject, finding.reference)
+                    let passage = |a| (a, Passage::new(self.geometry, ray, &a));
+                    self.explain(ray, finding.subject.map(passage), finding.reference)
                 };
         }
         finding
     }
 
     /// Explains two answers to the same ray.
-    fn explain(&self, ray: &Ray, subject: Option<Hit>, reference: Option<Hit>) -> Explanation {
-        let passage = |h: &Hit| Passage::new(self.geometry, ray, h);
-        let Some(a) = subject else {
+    fn explain(
+        &self,
+        ray: &Ray,
+        subject: Option<(Hit, Passage)>,
+        reference: Option<Hit>,
+    ) -> Explanation {
+        let Some((a, pa)) = subject else {
             return match reference {
                 None => (Class::Same, "", 0.0),
                 Some(b) => self.skipped(ray, b, None),
             };
         };
-        let pa = passage(&a);
         let error = pa.error(&a);
         if !(error <= 1.0) {
             return (Class::Unexplained, "a distance that is wrong", error);
         }
-        if let Some(b) = reference {
-            let pb = passage(&b);
-            if (a.object, a.prim) == (b.object, b.prim) && pa.root == pb.root {
-                return (Class::Same, "", 0.0);
-            }
+        let passage = |h: &Hit| Passage::new(self.geometry, ray, h);
+        if let Some(b) = &reference
+            && (a.object, a.prim) == (b.object, b.prim)
+            && (self.is_flat(&a) || pa.root == passage(b).root)
+        {
+            return (Class::Same, "", 0.0);
         }
         // Whatever the other says, this hit must be one.
         if let Some(wrong) = self.not_a_hit(ray, &a, &pa) {
@@ -163,6 +174,12 @@ impl CrossCheck<'_> {
                 }
             }
         }
+    }
+
+    /// Whether a line meets the primitive once at most.
+    fn is_flat(&self, hit: &Hit) -> bool {
+        let shape = self.geometry.object(hit.object).shape;
+        matches!(self.geometry.shape(shape), Shape::Mesh(_))
     }
 
     /// Whether the subject may pass over what the reference hits from `b` up to the subject's

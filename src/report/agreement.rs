@@ -1,17 +1,15 @@
 //! Two backends on many rays: how often they agree, and the rays on which they do worst.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::rays::{RayKind, RayMaker};
+use super::rays::{RayKind, RayMaker, Step, WALK};
 use crate::accel::{Class, CrossCheck, Finding};
 use crate::control::Control;
 use crate::geometry::{Hit, Ray};
 
-/// Rays compared by one task.
-const BATCH: u64 = 4096;
+/// Walks compared by one task.
+const BATCH: u64 = 1024;
 
 /// Counts over the rays of one kind.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -106,10 +104,11 @@ impl Agreement {
 }
 
 /// Asks both backends about one ray.
-pub fn ask(check: &CrossCheck<'_>, kind: RayKind, ray: &Ray) -> Finding {
-    match kind {
-        RayKind::Shadow => check.occluded(ray),
-        _ => check.intersect(ray),
+pub fn ask(check: &CrossCheck<'_>, kind: RayKind, step: &Step) -> Finding {
+    match (kind, step.hit) {
+        (RayKind::Shadow, _) => check.occluded(&step.ray),
+        (_, None) => check.intersect(&step.ray),
+        (_, Some(hit)) => check.judge(&step.ray, hit),
     }
 }
 
@@ -124,24 +123,26 @@ pub fn compare(
 ) -> Agreement {
     let stage = control.stage("compare", "rays", rays);
     let mut out = Agreement::default();
-    let mut compare = |kind: RayKind, numbers: Range<u64>| {
-        let parts: Vec<(Tally, Vec<Case>)> = (0..(numbers.end - numbers.start).div_ceil(BATCH))
+    // So many rays, from a number of walks on.
+    let mut compare = |kind: RayKind, start: u64, rays: u64| {
+        let walks = rays.div_ceil(WALK as u64);
+        let parts: Vec<(Tally, Vec<Case>)> = (0..walks.div_ceil(BATCH))
             .into_par_iter()
             .map(|b| {
                 let mut part = Agreement::default();
                 let mut tally = Tally::default();
-                let first = numbers.start + b * BATCH;
-                for i in first..(first + BATCH).min(numbers.end) {
+                for i in b * BATCH..((b + 1) * BATCH).min(walks) {
                     if control.stopped().is_some() {
                         break;
                     }
-                    let Some(ray) = maker.ray(kind, i) else {
-                        continue;
-                    };
-                    let finding = ask(check, kind, &ray);
-                    tally.count(&finding);
-                    if finding.class != Class::Same {
-                        part.worst.push(Case { kind, ray, finding });
+                    // The last walk may be more than is wanted.
+                    let wanted = (rays - i * WALK as u64).min(WALK as u64);
+                    for step in maker.walk(kind, start + i).iter().take(wanted as usize) {
+                        let (ray, finding) = (step.ray, ask(check, kind, step));
+                        tally.count(&finding);
+                        if finding.class != Class::Same {
+                            part.worst.push(Case { kind, ray, finding });
+                        }
                     }
                 }
                 part.keep_worst(keep);
@@ -162,11 +163,11 @@ pub fn compare(
     let mut kinds: Vec<(RayKind, Tally)> = RayKind::ALL
         .into_iter()
         .zip(0..)
-        .map(|(kind, k)| (kind, compare(kind, 0..share(k + 1) - share(k))))
+        .map(|(kind, k)| (kind, compare(kind, 0, share(k + 1) - share(k))))
         .collect();
     let left = rays - kinds.iter().map(|(_, t)| t.rays).sum::<u64>();
-    // Numbers that no share above came to.
-    kinds.push((RayKind::Random, compare(RayKind::Random, rays..rays + left)));
+    // From a walk on that no share above came to.
+    kinds.push((RayKind::Random, compare(RayKind::Random, rays, left)));
     for kind in RayKind::ALL {
         let mut sum = Tally::default();
         for (_, t) in kinds.iter().filter(|(k, _)| *k == kind) {
@@ -186,7 +187,8 @@ pub fn replay(check: &CrossCheck<'_>, cases: &[Question]) -> Agreement {
     for kind in RayKind::ALL {
         let mut tally = Tally::default();
         for (_, ray) in cases.iter().filter(|(k, _)| *k == kind) {
-            let (ray, finding) = (*ray, ask(check, kind, ray));
+            let (ray, step) = (*ray, Step::from(*ray));
+            let finding = ask(check, kind, &step);
             tally.count(&finding);
             out.worst.push(Case { kind, ray, finding });
         }

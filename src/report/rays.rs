@@ -1,11 +1,14 @@
 //! Rays like those that rendering traces, by kind, for comparing backends.
 //!
-//! Ray `i` of a kind is a pure function of (seed, kind, `i`) and of the reference backend, which
-//! is what paths are followed with.
+//! Walk `i` of a kind is a pure function of (seed, kind, `i`) and of the reference backend, which
+//! is what paths are followed with. All of a walk's segments serve: following a path for the sake
+//! of its last one would take most of the time.
+
+use arrayvec::ArrayVec;
 
 use crate::accel::Accelerator;
 use crate::cameras::Camera;
-use crate::geometry::{ObjectId, Ray, Shape, SurfacePoint};
+use crate::geometry::{Hit, ObjectId, Ray, Shape, SurfacePoint};
 use crate::materials::TransportMode;
 use crate::math::{BoundingSphere, DVec3};
 use crate::photons::PhotonSource;
@@ -53,12 +56,30 @@ impl RayKind {
     }
 }
 
-/// Walks that are tried before a ray is given up, for instance a bounced one that leaves the
-/// scene at once.
+/// Most rays of a walk.
+pub const WALK: usize = 5;
+
+/// Paths that are tried before a walk is left short, for instance where most of the light leaves
+/// the scene at once.
 const TRIES: u64 = 8;
 
-/// Most surfaces on the way to a ray.
-const MOST_BOUNCES: u64 = 5;
+/// A ray, and what the reference says to it if a path went on along it.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// The ray.
+    pub ray: Ray,
+    /// Its nearest hit, where that is known.
+    pub hit: Option<Option<Hit>>,
+}
+
+impl From<Ray> for Step {
+    fn from(ray: Ray) -> Self {
+        Self { ray, hit: None }
+    }
+}
+
+/// Rays that are made together.
+pub type Walk = ArrayVec<Step, WALK>;
 
 /// Makes rays.
 pub struct RayMaker<'a> {
@@ -75,60 +96,62 @@ pub struct RayMaker<'a> {
 }
 
 impl RayMaker<'_> {
-    /// Ray `i` of a kind; `None` if the scene has none such, for instance no light.
-    pub fn ray(&self, kind: RayKind, i: u64) -> Option<Ray> {
-        (0..TRIES).find_map(|try_| {
-            let key = hash2(hash2(self.seed, stream::TOOL), kind as u64);
+    /// Walk `i` of a kind: [`WALK`] rays, fewer where the scene hardly has such, none for instance
+    /// without a light.
+    pub fn walk(&self, kind: RayKind, i: u64) -> Walk {
+        let key = hash2(hash2(self.seed, stream::TOOL), kind as u64);
+        let mut walk = Walk::new();
+        for try_ in 0..TRIES {
             let mut rng = Rng::new(hash2(key, hash2(i, try_)));
-            self.attempt(kind, i, &mut rng)
-        })
+            // `None` where the path ended or the walk is full.
+            let _: Option<()> = self.extend(&mut walk, kind, i, &mut rng);
+            if walk.is_full() {
+                break;
+            }
+        }
+        walk
     }
 
-    fn attempt(&self, kind: RayKind, i: u64, rng: &mut Rng) -> Option<Ray> {
-        let bounces = rng.next_u64() % MOST_BOUNCES;
+    fn extend(&self, walk: &mut Walk, kind: RayKind, i: u64, rng: &mut Rng) -> Option<()> {
+        use TransportMode::{Importance, Radiance};
         match kind {
-            RayKind::Camera => Some(self.camera_ray(rng)),
+            RayKind::Camera => loop {
+                push(walk, self.camera_ray(rng))?;
+            },
             RayKind::Bounced => {
                 let ray = self.camera_ray(rng);
-                self.follow(ray, 1 + bounces, TransportMode::Radiance, rng)
+                let mut sp = self.at(&ray, self.accel.intersect(&ray))?;
+                loop {
+                    push(walk, self.bounce(&sp, Radiance, rng))?;
+                    sp = self.end(walk)?;
+                }
             }
             RayKind::Photon => {
-                let ray = self.photon(i, rng)?;
-                self.follow(ray, bounces, TransportMode::Importance, rng)
+                push(walk, self.photon(i, rng)?)?;
+                loop {
+                    let sp = self.end(walk)?;
+                    push(walk, self.bounce(&sp, Importance, rng))?;
+                }
             }
             RayKind::Shadow => {
-                let ray = self.camera_ray(rng);
-                let ray = self.follow(ray, bounces, TransportMode::Radiance, rng)?;
-                let sp = self.hit(&ray)?;
-                let (id, _, rest) = self.scene.pick_light(sp.p, None, rng.next_1d())?;
-                let li = self
-                    .scene
-                    .light(id)
-                    .sample_li(sp.p, [rest, rng.next_1d()])?;
-                Some(match li.target {
-                    Some(target) => sp.spawn_to(target),
-                    None => sp.spawn(li.wi),
-                })
-            }
-            RayKind::Random => {
-                let around = self.around();
-                let o = somewhere(&around, 2.0, rng);
-                let mut ray = Ray::new(o, somewhere(&around, 1.0, rng) - o);
-                if i.is_multiple_of(2) {
-                    let (a, b) = (rng.next_1d() as f32, rng.next_1d() as f32);
-                    (ray.tmin, ray.tmax) = (a.min(b), a.max(b));
+                let mut ray = self.camera_ray(rng);
+                loop {
+                    let sp = self.at(&ray, self.accel.intersect(&ray))?;
+                    push(walk, self.to_light(&sp, rng)?)?;
+                    ray = self.bounce(&sp, Radiance, rng);
                 }
-                Some(ray)
             }
-            RayKind::Aimed => {
+            RayKind::Random => loop {
+                push(walk, self.random(rng))?;
+            },
+            RayKind::Aimed => loop {
                 let o = somewhere(&self.around(), 1.5, rng);
                 let target = self.delicate(o, rng)?;
                 // From where the ray really begins, once that is rounded.
                 let o = Ray::new(o, DVec3::X).origin();
-                Some(Ray::new(o, target - o))
-            }
+                push(walk, Ray::new(o, target - o))?;
+            },
         }
-        .filter(Ray::is_valid)
     }
 
     fn around(&self) -> BoundingSphere {
@@ -147,23 +170,47 @@ impl RayMaker<'_> {
         Some(source.emit(rng.next_u64() % source.len())?.ray)
     }
 
-    fn hit(&self, ray: &Ray) -> Option<SurfacePoint> {
-        let hit = self.accel.intersect(ray)?;
-        Some(self.scene.surface_point(ray, &hit))
+    /// A segment, or a whole line.
+    fn random(&self, rng: &mut Rng) -> Ray {
+        let around = self.around();
+        let o = somewhere(&around, 2.0, rng);
+        let mut ray = Ray::new(o, somewhere(&around, 1.0, rng) - o);
+        if rng.next_1d() < 0.5 {
+            let (a, b) = (rng.next_1d() as f32, rng.next_1d() as f32);
+            (ray.tmin, ray.tmax) = (a.min(b), a.max(b));
+        }
+        ray
     }
 
-    /// The ray after some scattering events.
-    fn follow(&self, mut ray: Ray, n: u64, mode: TransportMode, rng: &mut Rng) -> Option<Ray> {
-        for _ in 0..n {
-            let sp = self.hit(&ray)?;
-            let bsdf = self.scene.bsdf(&sp, None, mode);
-            // What scatters nothing is left in any direction: a ray is all that is wanted.
-            let wi = bsdf
-                .sample(rng.next_1d(), rng.next_2d())
-                .map_or_else(|| warp::sphere(rng.next_2d()), |s| s.wi);
-            ray = sp.spawn(wi);
-        }
-        Some(ray)
+    fn to_light(&self, sp: &SurfacePoint, rng: &mut Rng) -> Option<Ray> {
+        let (id, _, rest) = self.scene.pick_light(sp.p, None, rng.next_1d())?;
+        let light = self.scene.light(id);
+        let li = light.sample_li(sp.p, [rest, rng.next_1d()])?;
+        Some(match li.target {
+            Some(target) => sp.spawn_to(target),
+            None => sp.spawn(li.wi),
+        })
+    }
+
+    fn at(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfacePoint> {
+        Some(self.scene.surface_point(ray, &hit?))
+    }
+
+    /// Where the last ray of a walk ends.
+    fn end(&self, walk: &mut Walk) -> Option<SurfacePoint> {
+        let last = walk.last_mut()?;
+        let hit = self.accel.intersect(&last.ray);
+        last.hit = Some(hit);
+        self.at(&last.ray, hit)
+    }
+
+    fn bounce(&self, sp: &SurfacePoint, mode: TransportMode, rng: &mut Rng) -> Ray {
+        let bsdf = self.scene.bsdf(sp, None, mode);
+        // What scatters nothing is left in any direction: a ray is all that is wanted.
+        let wi = bsdf
+            .sample(rng.next_1d(), rng.next_2d())
+            .map_or_else(|| warp::sphere(rng.next_2d()), |s| s.wi);
+        sp.spawn(wi)
     }
 
     /// A vertex, a point of an edge, or one of the rim of a sphere seen from `o`.
@@ -207,6 +254,14 @@ impl RayMaker<'_> {
         };
         Some(to_world.transform_point3(local))
     }
+}
+
+/// Adds a ray to a walk; `None` if it is none, or the walk's last.
+fn push(walk: &mut Walk, ray: Ray) -> Option<()> {
+    if ray.is_valid() {
+        walk.push(ray.into());
+    }
+    (ray.is_valid() && !walk.is_full()).then_some(())
 }
 
 /// A point in a ball of so many times the radius.
