@@ -9,6 +9,7 @@ mod light_sampling;
 mod path;
 mod photon;
 mod pixel_edges;
+mod pixel_glints;
 mod pixel_plan;
 mod settings;
 mod stored_light;

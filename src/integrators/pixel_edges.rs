@@ -2,8 +2,8 @@
 //!
 //! Rays through the middle and the corners of a pixel meet different patches, or the middle's hit
 //! forecasts an edge that matters on the way to a corner, or the outline of a sphere crosses the
-//! pixel, or something may lie between the rays. What is seen in mirrors and through glass is not
-//! asked for.
+//! pixel, or something may lie between the rays. Of what mirrors and glass show, only small lights
+//! are asked for, by [`pixel_glints`](super::pixel_glints).
 
 use rayon::prelude::*;
 

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::Region;
 use super::camera_pass::View;
 use super::pixel_edges::Finder;
+use super::pixel_glints::{Glint, Glints};
 use super::{BATCH, Integrator, RenderContext, Sample, Scratch, Spacing};
 use crate::cameras::Camera;
 use crate::control::Control;
@@ -28,6 +29,9 @@ const EVEN: f64 = 0.5;
 
 /// Most samples of a pixel, over the mean.
 const MOST: f64 = 8.0;
+
+/// The same where the forecast tells of a light that most samples miss.
+const MOST_FORESEEN: f64 = 64.0;
 
 /// Neighbours that a pixel is judged by lie at most so many pixels away.
 const AROUND: usize = 2;
@@ -86,6 +90,8 @@ impl PixelPlan {
         let finder = Finder::new(context.scene, context.accel, view.camera, size);
         let (edges, traced) = finder.find(region);
         rays.check += traced;
+        let (glints, traced) = Glints::new(context, view.camera, size).find(region);
+        rays.check += traced;
         let demand = |edge: &bool| Demand {
             samples,
             interpolated: interpolated && !edge,
@@ -95,7 +101,7 @@ impl PixelPlan {
         let width = (region.x1 - region.x0) as usize;
         let mut deviations: Vec<f64> = (0..edges.len())
             .into_par_iter()
-            .map(|i| deviation(&spreads, &edges, width, i))
+            .map(|i| deviation(&spreads, &edges, &glints, width, i))
             .collect();
         let mean = |kept: &dyn Fn(usize) -> bool| {
             let own = (0..edges.len()).filter(|i| kept(*i));
@@ -109,7 +115,7 @@ impl PixelPlan {
         }
         Self {
             region,
-            share: shares(&deviations),
+            share: shares(&deviations, &glints),
             edges,
             interpolated,
         }
@@ -303,16 +309,18 @@ impl Spread {
     }
 }
 
-/// Relative deviation of a sample of pixel `i`, by its neighbours: those with an edge if it has
-/// one, otherwise those without. If an edge has none beside it, by the step from one neighbour to
-/// the other.
-fn deviation(spreads: &[Spread], edges: &[bool], width: usize, i: usize) -> f64 {
+/// Relative deviation of a sample of pixel `i`, by what is foreseen in it and by its neighbours:
+/// those with an edge if it has one, otherwise those without. If an edge has none beside it, by
+/// the step from one neighbour to the other.
+fn deviation(spreads: &[Spread], edges: &[bool], glints: &[Glint], width: usize, i: usize) -> f64 {
     let (x, y, height) = (i % width, i / width, spreads.len() / width);
     let around = |k: usize, end: usize| k.saturating_sub(AROUND)..(k + AROUND + 1).min(end);
+    // A light that is seldom met is foreseen: what samples say of it must not call them to pixels
+    // beside it, and away from its own, just when they have met it.
     let others = || {
         around(y, height)
             .flat_map(|y| around(x, width).map(move |x| y * width + x))
-            .filter(|k| *k != i)
+            .filter(|k| *k != i && glints[*k].variance == 0.0)
     };
     let alike = others().any(|k| edges[k] == edges[i]);
     let judges = || others().filter(|k| !alike || edges[*k] == edges[i]);
@@ -324,7 +332,8 @@ fn deviation(spreads: &[Spread], edges: &[bool], width: usize, i: usize) -> f64 
         squares.sum::<f64>() / n
     };
     let variance = within + if edges[i] && !alike { between() } else { 0.0 };
-    let relative = variance / (mean * mean + EPSILON);
+    let foreseen = |g: &Glint| g.variance / ((mean + g.mean).powi(2) + EPSILON);
+    let relative = variance / (mean * mean + EPSILON) + foreseen(&glints[i]);
     if relative.is_finite() {
         relative.sqrt()
     } else {
@@ -333,14 +342,19 @@ fn deviation(spreads: &[Spread], edges: &[bool], width: usize, i: usize) -> f64 
 }
 
 /// In proportion to the deviations, but from [`EVEN`] to [`MOST`], with a mean of one.
-fn shares(deviations: &[f64]) -> Vec<f32> {
+fn shares(deviations: &[f64], glints: &[Glint]) -> Vec<f32> {
     let n = deviations.len() as f64;
     let largest = deviations.iter().copied().fold(0.0, f64::max);
     if !(largest > 0.0) {
         return vec![1.0; deviations.len()];
     }
-    let share = |d: f64, scale: f64| (d * scale).clamp(EVEN, MOST);
-    let mean = |scale: f64| deviations.iter().map(|d| share(*d, scale)).sum::<f64>() / n;
+    let share = |i: usize, scale: f64| {
+        let foreseen = glints[i].variance > 0.0;
+        let most = if foreseen { MOST_FORESEEN } else { MOST };
+        (deviations[i] * scale).clamp(EVEN, most)
+    };
+    let all = 0..deviations.len();
+    let mean = |scale: f64| all.clone().map(|i| share(i, scale)).sum::<f64>() / n;
     let mut high = 1.0 / largest;
     // Where a few pixels alone vary, their bound keeps them from taking all that others leave.
     for _ in 0..64 {
@@ -357,7 +371,7 @@ fn shares(deviations: &[f64]) -> Vec<f32> {
             high = middle;
         }
     }
-    deviations.iter().map(|d| share(*d, high) as f32).collect()
+    all.clone().map(|i| share(i, high) as f32).collect()
 }
 
 #[cfg(test)]
@@ -372,7 +386,7 @@ mod tests {
             (0..1000).map(|i| f64::from(i).powi(3)).collect(),
             [vec![0.0; 999], vec![1.0]].concat(),
         ] {
-            let s = shares(&deviations);
+            let s = shares(&deviations, &vec![Glint::default(); deviations.len()]);
             let mean = s.iter().map(|x| f64::from(*x)).sum::<f64>() / s.len() as f64;
             let bounds = s.iter().all(|x| (EVEN as f32..=8.0).contains(x));
             // One pixel alone cannot take what all others leave.
@@ -390,6 +404,7 @@ mod tests {
             };
             25
         ];
+        let none = [Glint::default(); 25];
         let mut loud = quiet.clone();
         loud[12] = Spread {
             mean: 50.0,
@@ -397,21 +412,23 @@ mod tests {
         };
         for edge in [false, true] {
             let edges = [edge; 25];
-            let [a, b] = [&quiet, &loud].map(|s| deviation(s, &edges, 5, 12));
+            let [a, b] = [&quiet, &loud].map(|s| deviation(s, &edges, &none, 5, 12));
             assert_eq!(a, b);
-            assert!(deviation(&loud, &edges, 5, 11) > 2.0 * a);
+            assert!(deviation(&loud, &edges, &none, 5, 11) > 2.0 * a);
         }
         // Like is judged by like, and an edge alone by the step across it.
         let mut edges = [false; 25];
         edges[12] = true;
-        assert!(deviation(&loud, &edges, 5, 11) == deviation(&quiet, &[false; 25], 5, 11));
+        assert!(
+            deviation(&loud, &edges, &none, 5, 11) == deviation(&quiet, &[false; 25], &none, 5, 11)
+        );
         let step: Vec<Spread> = (0..25)
             .map(|i| Spread {
                 mean: f64::from(u8::from(i % 5 > 2)),
                 variance: 0.0,
             })
             .collect();
-        assert_eq!(deviation(&step, &[false; 25], 5, 12), 0.0);
-        assert!(deviation(&step, &edges, 5, 12) > 0.5);
+        assert_eq!(deviation(&step, &[false; 25], &none, 5, 12), 0.0);
+        assert!(deviation(&step, &edges, &none, 5, 12) > 0.5);
     }
 }
