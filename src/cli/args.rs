@@ -179,9 +179,11 @@ pub struct RenderArgs {
     #[arg(help_heading = "Image")]
     pub spp: Option<u32>,
     /// How samples are shared among pixels: evenly, or more where edges are forecast and samples
-    /// differ. Adaptive is for a known --spp, not for images in passes
-    #[arg(long, value_enum, default_value = "uniform", help_heading = "Image")]
-    pub pixel_sampling: PixelSampling,
+    /// differ. Adaptive is for a known --spp, not for images in passes; a --crop is the same as in
+    /// the whole image if both are uniform [default: adaptive for the integrator photon where it
+    /// can be, else uniform]
+    #[arg(long, value_enum, help_heading = "Image")]
+    pub pixel_sampling: Option<PixelSampling>,
     /// Whether adaptive sampling interpolates indirect light in pixels without an edge
     #[arg(long, value_name = "on|off", default_value = "on", value_parser = values::on_off)]
     #[arg(help_heading = "Image", action = clap::ArgAction::Set)]

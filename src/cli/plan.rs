@@ -9,7 +9,7 @@ use super::values::{Size, Sky};
 use crate::effects;
 use crate::error::{Error, Result};
 use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits, SolidGlass};
-use crate::integrators::{IntegratorSettings, PhotonNeeds, suited};
+use crate::integrators::{IntegratorEntry, IntegratorSettings, PhotonNeeds, suited};
 use crate::output::{self, OutputSettings};
 use crate::pipeline::{PhotonFile, PixelSampling, Progressive, RenderSettings};
 use crate::plugins::Registry;
@@ -83,7 +83,7 @@ impl Plan {
         for path in &args.outputs {
             output::format_of(&registry.outputs, path)?;
         }
-        if args.pixel_sampling == PixelSampling::Adaptive && progressive(args).is_some() {
+        if args.pixel_sampling == Some(PixelSampling::Adaptive) && progressive(args).is_some() {
             return Err(Error::Usage(
                 "--pixel-sampling adaptive shares out a known --spp; leave out --target-error, \
                  --time-limit, --write-every and --resume"
@@ -135,7 +135,8 @@ impl Plan {
                     Some(_) => u32::MAX,
                     None => args.quality.spp(),
                 }),
-                pixel_sampling: args.pixel_sampling,
+                // The integrator has a say in it.
+                pixel_sampling: args.pixel_sampling.unwrap_or_default(),
                 interpolation: args.interpolation,
                 progressive: progressive(args),
                 crop: args.crop.map(|c| c.0),
@@ -200,7 +201,12 @@ impl Plan {
     ///
     /// # Errors
     /// A crop outside the image.
-    pub fn settings_for(&self, scene: &Scene, integrator: &str) -> Result<RenderSettings> {
+    pub fn settings_for(
+        &self,
+        scene: &Scene,
+        integrator: &str,
+        registry: &Registry,
+    ) -> Result<RenderSettings> {
         let size = self.size.unwrap_or_else(|| {
             let camera = match &self.settings.camera {
                 None => scene.cameras.first(),
@@ -213,8 +219,18 @@ impl Plan {
             width: size.width,
             height: size.height,
             integrator: Some(integrator.into()),
+            pixel_sampling: self.pixel_sampling_for(registry.integrators.find(integrator)?),
             integrator_settings: integrator_settings(&self.args, size),
             ..self.settings.clone()
+        })
+    }
+
+    /// Adaptive where that is faster to the same error.
+    fn pixel_sampling_for(&self, integrator: &IntegratorEntry) -> PixelSampling {
+        let gains = integrator.photons == PhotonNeeds::All && self.settings.progressive.is_none();
+        self.args.pixel_sampling.unwrap_or(match gains {
+            true => PixelSampling::Adaptive,
+            false => PixelSampling::Uniform,
         })
     }
 

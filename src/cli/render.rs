@@ -47,7 +47,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
         }
     }
     let (integrator, reason) = plan.integrator_for(&scene, &registry)?;
-    let settings = plan.settings_for(&scene, integrator)?;
+    let settings = plan.settings_for(&scene, integrator, &registry)?;
     if !plan.quiet {
         if let Some(note) = camera_note(&scene, settings.camera.as_deref()) {
             console::say(format_args!("note: {note}"));

@@ -46,8 +46,9 @@ impl Method {
     }
 }
 
-/// The preset of `--quality` that renders like a rung of the ladder with photons, at the size
-/// that pictures have if none is given; smaller ones have as many photons per pixel.
+/// The preset of `--quality` that has the samples and photons of a rung of the ladder, at the size
+/// that pictures have if none is given; smaller ones have as many photons per pixel. Pixels are
+/// sampled adaptively by default.
 pub(super) fn preset(rung: u32) -> Option<&'static str> {
     ["draft", "normal", "high"]
         .get(rung.checked_sub(1)? as usize)
