@@ -1,29 +1,35 @@
-//! How fast a file becomes a scene, against reading the same file with the `gltf` crate: that one
-//! reads the buffers whole and hands out iterators, which are collected here into the vectors
-//! that a renderer needs. Each measurement is a process of its own, so that its peak of memory
-//! is its own.
+//! How fast a file becomes a scene, and what memory that takes, against reading its bytes and
+//! against the `gltf` crate: that one reads buffers and images whole and hands out iterators, which
+//! are collected here into the vectors that a renderer needs. Each measurement is a process of its
+//! own, so that its peak of memory is its own; what a process has before it begins does not count.
+//! The readers take turns, so that a busy machine is busy for all of them.
 //!
-//! Run with `cargo bench --bench import [-- FILE…]`; without files it writes one of a million
-//! triangles.
+//! Run with `cargo bench --bench import [-- FILE…]`; `million`, which is also what is read without
+//! files, stands for one of a million triangles that is made here.
 
 #![allow(
     clippy::unwrap_used,
     reason = "a benchmark may stop at the first surprise"
 )]
 
+use std::collections::HashMap;
+use std::fs;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Arc;
 use std::time::Instant;
 
 use dualight::geometry::Shape;
 use dualight::import::{ImportOptions, load};
 use dualight::scene::ScenePlugins;
-use dualight::stats::peak_memory;
 use serde_json::{Value, json};
 
-/// Times that each measurement is made; the best one counts.
-const REPEATS: usize = 5;
+/// Times that each measurement is made; the median counts.
+const REPEATS: usize = 9;
+
+/// Who reads: the system alone, the crate, Dualight.
+const READERS: [&str; 3] = ["read", "gltf", "dualight"];
 
 /// Meshes of the file that is written, and quads along one side of each.
 const MESHES: usize = 8;
@@ -37,71 +43,142 @@ fn main() {
         return one(reader, Path::new(file));
     }
     let dir = tempfile::tempdir().unwrap();
-    let mut files: Vec<PathBuf> = words
-        .iter()
-        .filter(|w| !w.starts_with("--"))
-        .map(PathBuf::from)
-        .collect();
+    let mut files: Vec<&str> = words.iter().map(String::as_str).collect();
+    files.retain(|w| !w.starts_with("--"));
     if files.is_empty() {
-        let path = dir.path().join("million.glb");
-        std::fs::write(&path, grid()).unwrap();
-        files.push(path);
+        files.push("million");
     }
     println!(
-        "{:<24}{:>10}{:>10}{:>10}{:>12}{:>12}{:>12}",
-        "file", "reader", "seconds", "MB/s", "Mtri/s", "decoded MB", "peak MB"
+        "{:<24}{:>10}{:>10}{:>9}{:>9}{:>9}{:>13}{:>11}{:>14}",
+        "file",
+        "reader",
+        "seconds",
+        "of gltf",
+        "MB/s",
+        "Mtri/s",
+        "decoded MB",
+        "peak MB",
+        "peak/decoded"
     );
-    for file in &files {
-        let size = std::fs::metadata(file).unwrap().len() as f64;
-        for reader in ["read", "gltf", "dualight"] {
-            let runs: Vec<[f64; 4]> = (0..REPEATS).map(|_| run(reader, file)).collect();
-            let best = |k: usize| runs.iter().map(|r| r[k]).fold(f64::INFINITY, f64::min);
-            let (seconds, [_, triangles, decoded, _]) = (best(0), runs[0]);
-            println!(
-                "{:<24}{reader:>10}{seconds:>10.3}{:>10.0}{:>12.2}{:>12.1}{:>12.1}",
-                file.file_name().unwrap().to_string_lossy(),
-                size / seconds / 1e6,
-                triangles / seconds / 1e6,
-                decoded / 1e6,
-                best(3) / 1e6,
-            );
-        }
+    for file in files {
+        let path = match file {
+            "million" => {
+                let path = dir.path().join("million.glb");
+                fs::write(&path, grid()).unwrap();
+                path
+            }
+            other => PathBuf::from(other),
+        };
+        measure(&path);
     }
 }
 
-/// Measures in a process of its own: seconds, triangles, bytes as decoded, bytes at the peak.
-fn run(reader: &str, file: &Path) -> [f64; 4] {
+/// Prints the medians of all readers of a file.
+fn measure(file: &Path) {
+    let size = fs::metadata(file).unwrap().len() as f64;
+    let mut runs: HashMap<&str, Vec<[f64; 4]>> = HashMap::new();
+    let mut refused: HashMap<&str, String> = HashMap::new();
+    for _ in 0..REPEATS {
+        for reader in READERS {
+            if refused.contains_key(reader) {
+                continue;
+            }
+            match run(reader, file) {
+                Ok(numbers) => runs.entry(reader).or_default().push(numbers),
+                Err(why) => {
+                    refused.insert(reader, why);
+                }
+            }
+        }
+    }
+    for reader in READERS {
+        let name = file.file_name().unwrap().to_string_lossy();
+        if let Some(why) = refused.get(reader) {
+            println!("{name:<24}{reader:>10}   refuses it: {why}");
+            continue;
+        }
+        let own = &runs[reader];
+        let at = |k: usize| median(own.iter().map(|r| r[k]).collect());
+        let (seconds, triangles, decoded, peak) = (at(0), at(1), at(2), at(3));
+        // Turn by turn, which takes out how busy the machine was.
+        let ratio = match runs.get("gltf") {
+            Some(crates) if reader != "read" => {
+                let turns = own.iter().zip(crates).map(|(a, b)| a[0] / b[0]);
+                format!("{:.2}", median(turns.collect()))
+            }
+            _ => "-".to_owned(),
+        };
+        println!(
+            "{name:<24}{reader:>10}{seconds:>10.4}{ratio:>9}{:>9.0}{:>9.2}{:>13.2}{:>11.2}{:>14.2}",
+            size / seconds / 1e6,
+            triangles / seconds / 1e6,
+            decoded / 1e6,
+            peak / 1e6,
+            peak / decoded,
+        );
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Measures in a process of its own: seconds, triangles, bytes as decoded, bytes at the peak. Fails
+/// with the first line of what the process says.
+fn run(reader: &str, file: &Path) -> Result<[f64; 4], String> {
     let out = Command::new(std::env::current_exe().unwrap())
         .args(["--one", reader])
         .arg(file)
         .output()
         .unwrap();
-    assert!(
-        out.status.success(),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
+    if !out.status.success() {
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        return Err(text.lines().next().unwrap_or("no reason").to_owned());
+    }
     let text = String::from_utf8(out.stdout).unwrap();
     let mut numbers = text.split_whitespace().map(|w| w.parse().unwrap());
-    std::array::from_fn(|_| numbers.next().unwrap())
+    Ok(std::array::from_fn(|_| numbers.next().unwrap()))
 }
 
 fn one(reader: &str, file: &Path) {
+    let base = most_memory(true);
     let start = Instant::now();
-    let (triangles, decoded) = match reader {
+    let done = match reader {
         // The least that any reader needs: the bytes, from the system's cache.
-        "read" => (0, black_box(std::fs::read(file).unwrap()).len()),
+        "read" => Ok((0, black_box(fs::read(file).unwrap()).len())),
         "gltf" => by_crate(file),
         _ => by_us(file),
     };
     let seconds = start.elapsed().as_secs_f64();
-    let peak = peak_memory().unwrap_or(0);
-    println!("{seconds} {triangles} {decoded} {peak}");
+    match done {
+        Ok((triangles, decoded)) => {
+            let peak = most_memory(false) - base;
+            println!("{seconds} {triangles} {decoded} {peak}");
+        }
+        Err(why) => {
+            eprintln!("{why}");
+            std::process::exit(1);
+        }
+    }
 }
 
-fn by_us(file: &Path) -> (usize, usize) {
-    let scene = load(file, &ImportOptions::default(), ScenePlugins::default()).unwrap();
-    let scene = black_box(scene);
+/// Most bytes that this process had in memory, from now on if it is to `begin` anew. 0 where the
+/// system is not Linux.
+fn most_memory(begin: bool) -> u64 {
+    if begin {
+        let _ = fs::write("/proc/self/clear_refs", "5");
+    }
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"));
+    let kilobytes = line.and_then(|l| l.split_whitespace().nth(1)?.parse().ok());
+    kilobytes.unwrap_or(0u64) * 1024
+}
+
+/// Triangles and bytes of what became of a file: vertices, indices and the images as they are.
+fn by_us(file: &Path) -> Result<(usize, usize), String> {
+    let scene = load(file, &ImportOptions::default(), ScenePlugins::default());
+    let scene = black_box(scene.map_err(|e| e.to_string())?);
     let (mut triangles, mut bytes) = (0, 0);
     for shape in &scene.geometry.shapes {
         if let Shape::Mesh(m) = shape {
@@ -111,21 +188,31 @@ fn by_us(file: &Path) -> (usize, usize) {
             bytes += 16 * (m.colors.len() + m.tangents.len());
         }
     }
-    (triangles, bytes)
+    let images: HashMap<_, usize> = scene
+        .textures
+        .iter()
+        .map(|t| (Arc::as_ptr(&t.image), t.image.texels().as_bytes().len()))
+        .collect();
+    Ok((triangles, bytes + images.values().sum::<usize>()))
 }
 
-fn by_crate(file: &Path) -> (usize, usize) {
-    let blob = gltf::Gltf::open(file).unwrap();
-    let buffers = gltf::import_buffers(&blob.document, file.parent(), blob.blob).unwrap();
+fn by_crate(file: &Path) -> Result<(usize, usize), String> {
+    let (document, buffers, images) = gltf::import(file).map_err(|e| e.to_string())?;
     let (mut triangles, mut bytes) = (0, 0);
-    for p in blob.document.meshes().flat_map(|m| m.primitives()) {
+    for p in document.meshes().flat_map(|m| m.primitives()) {
         let reader = p.reader(|b| buffers.get(b.index()).map(|d| &d.0[..]));
         let positions: Vec<[f32; 3]> = reader.read_positions().into_iter().flatten().collect();
         let normals: Vec<[f32; 3]> = reader.read_normals().into_iter().flatten().collect();
+        let tangents: Vec<[f32; 4]> = reader.read_tangents().into_iter().flatten().collect();
         let uvs: Vec<[f32; 2]> = reader
             .read_tex_coords(0)
             .into_iter()
             .flat_map(|t| t.into_f32())
+            .collect();
+        let colors: Vec<[f32; 4]> = reader
+            .read_colors(0)
+            .into_iter()
+            .flat_map(|c| c.into_rgba_f32())
             .collect();
         let indices: Vec<u32> = reader
             .read_indices()
@@ -134,9 +221,15 @@ fn by_crate(file: &Path) -> (usize, usize) {
             .collect();
         triangles += indices.len() / 3;
         bytes += 12 * (positions.len() + normals.len()) + 8 * uvs.len() + 4 * indices.len();
-        black_box((positions, normals, uvs, indices));
+        bytes += 16 * (tangents.len() + colors.len());
+        // They stay, as those of a scene do.
+        std::mem::forget(black_box((
+            positions, normals, tangents, uvs, colors, indices,
+        )));
     }
-    (triangles, bytes)
+    bytes += images.iter().map(|i| i.pixels.len()).sum::<usize>();
+    black_box(images);
+    Ok((triangles, bytes))
 }
 
 /// Wavy grids with normals and texture coordinates, as GLB.

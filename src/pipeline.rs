@@ -191,6 +191,7 @@ fn render_in_pool(
 
     let accel = {
         let _stage = control.stage("build", "primitives", 0);
+        scene.geometry.prepare();
         (backend.build)(&scene.geometry, rayon::current_num_threads())?
     };
     clock.lap("build");

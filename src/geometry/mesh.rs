@@ -1,5 +1,7 @@
 //! Indexed triangle meshes.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 
 use super::facet::Facet;
@@ -42,7 +44,7 @@ pub struct TriangleMesh {
     /// Tangents per vertex along growing `u`, with the sign of the bitangent; may be empty.
     pub tangents: Vec<[f32; 4]>,
     /// The triangles prepared for refinement, all of them or none.
-    pub facets: Vec<Facet>,
+    pub facets: OnceLock<Vec<Facet>>,
 }
 
 /// Meshes of up to so many triangles are prepared for refinement: walls, floors and furniture,
@@ -76,17 +78,19 @@ impl TriangleMesh {
     }
 
     /// Prepares the triangles for refinement, if they are few. Corners must not change afterwards.
-    pub fn prepare(&mut self) {
+    /// Hits are the same without, but take longer.
+    pub fn prepare(&self) {
         if self.indices.len() <= PREPARED {
             let all = 0..self.indices.len() as u32;
-            self.facets = all.map(|i| Facet::new(self.corners(i))).collect();
+            self.facets
+                .get_or_init(|| all.map(|i| Facet::new(self.corners(i))).collect());
         }
     }
 
     /// Triangle `prim` as refinement needs it.
     #[inline(always)]
     pub fn facet(&self, prim: u32) -> Facet {
-        match self.facets.get(prim as usize) {
+        match self.facets.get().and_then(|f| f.get(prim as usize)) {
             Some(facet) => *facet,
             None => Facet::new(self.corners(prim)),
         }

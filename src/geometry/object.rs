@@ -210,6 +210,15 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// Prepares small meshes for refinement, on all threads: for those that trace rays in it.
+    pub fn prepare(&self) {
+        self.shapes.par_iter().for_each(|shape| {
+            if let Shape::Mesh(mesh) = shape {
+                mesh.prepare();
+            }
+        });
+    }
+
     /// The object named `id`.
     #[inline]
     pub fn object(&self, id: ObjectId) -> &Object {

@@ -1,10 +1,11 @@
 //! Bytes that are read when they are needed: a large file is never held in memory as a whole,
 //! only the range that is being decoded.
 
-use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Read};
+use std::ops::Deref;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A run of bytes, in memory or in a file.
 pub(super) enum Buffer {
@@ -15,6 +16,28 @@ pub(super) enum Buffer {
     File { file: File, start: u64, len: usize },
     /// Nowhere, as the fallback buffers of `EXT_meshopt_compression` may be.
     Absent { len: usize },
+}
+
+/// Bytes that were read.
+pub(super) enum Bytes<'a> {
+    /// They are in memory elsewhere.
+    Here(&'a [u8]),
+    /// Read for this.
+    Owned(Vec<u8>),
+    /// So many from a place on of some that others read, too.
+    Shared(Arc<[u8]>, usize, usize),
+}
+
+impl Deref for Bytes<'_> {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Here(bytes) => bytes,
+            Self::Owned(bytes) => bytes,
+            Self::Shared(bytes, at, len) => &bytes[*at..*at + *len],
+        }
+    }
 }
 
 impl Buffer {
@@ -51,19 +74,19 @@ impl Buffer {
     }
 
     /// `len` bytes from `at` on.
-    pub(super) fn read(&self, at: usize, len: usize) -> io::Result<Cow<'_, [u8]>> {
+    pub(super) fn read(&self, at: usize, len: usize) -> io::Result<Bytes<'_>> {
         let end = at
             .checked_add(len)
             .filter(|end| *end <= self.len())
             .ok_or(io::ErrorKind::UnexpectedEof)?;
         match self {
-            Self::Memory(bytes) => Ok(Cow::Borrowed(&bytes[at..end])),
+            Self::Memory(bytes) => Ok(Bytes::Here(&bytes[at..end])),
             #[cfg(unix)]
             Self::File { file, start, .. } => {
                 use std::os::unix::fs::FileExt;
                 let mut out = vec![0; len];
                 file.read_exact_at(&mut out, start + at as u64)?;
-                Ok(Cow::Owned(out))
+                Ok(Bytes::Owned(out))
             }
             Self::Absent { .. } => Err(io::ErrorKind::NotFound.into()),
         }

@@ -56,11 +56,11 @@ impl<'a> Draco<'a> {
         })
     }
 
-    /// Its triangles, one after the other.
-    pub(super) fn indices(&self) -> Result<Vec<u32>, Problem> {
+    /// Its triangles.
+    pub(super) fn indices(&self) -> Result<Vec<[u32; 3]>, Problem> {
         let n = self.mesh.num_points();
-        let order: Vec<u32> = self.mesh.faces().iter().flatten().map(|i| i.0).collect();
-        match order.iter().find(|&&i| i as usize >= n) {
+        let order: Vec<[u32; 3]> = self.mesh.faces().iter().map(|t| t.map(|i| i.0)).collect();
+        match order.iter().flatten().find(|&&i| i as usize >= n) {
             Some(i) => Err(self.at.problem(format!("index {i} is out of range"))),
             None => Ok(order),
         }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::accessor::Source;
+use super::buffer::Bytes;
 use super::container;
 use super::image;
 use super::json::Cursor;
@@ -239,7 +240,7 @@ fn picture<'a>(i: &Cursor<'a>, source: &Source<'a>, path: &Path) -> ImageInfo {
         problem: None,
     };
     let bytes = match (i.get("uri"), i.get("bufferView")) {
-        (Some(uri), _) => container::read_uri(&uri, path).map(Into::into),
+        (Some(uri), _) => container::read_uri(&uri, path).map(Bytes::Owned),
         (None, Some(view)) => source.views.bytes(&view),
         (None, None) => Err(i.problem("has neither a URI nor a buffer view")),
     };

@@ -68,16 +68,16 @@ pub(super) fn read<'a>(
         Some(e) => {
             // Strips come out as lists.
             mode = 4;
-            Some(compressed(p, &e, &mut attributes)?)
+            Order::Triangles(compressed(p, &e, &mut attributes)?)
         }
-        None => order(p, &mut attributes, &position)?,
+        None => order(p, &mut attributes, &position, mode)?,
     };
     let mut vertices = attributes.vertices()?;
     let (mut indices, mut points) = (Vec::new(), None);
     if mode == 0 {
         points = Some(order);
     } else {
-        indices = triangles(order, vertices.positions.len(), mode);
+        indices = order.triangles(vertices.positions.len(), mode);
         check_normals(&vertices, &indices, &attributes)?;
     }
     morph::apply(p, &attributes, shaping.weights, &mut vertices)?;
@@ -113,7 +113,7 @@ fn compressed<'a>(
     p: &Cursor<'a>,
     e: &Cursor<'a>,
     attributes: &mut Attributes<'_, 'a>,
-) -> Result<Vec<u32>, Problem> {
+) -> Result<Vec<[u32; 3]>, Problem> {
     let indices = match p.get("indices") {
         Some(at) => attributes.source.accessor(&at)?.count,
         None => attributes.count,
@@ -129,7 +129,7 @@ fn compressed<'a>(
     _: &Cursor<'a>,
     e: &Cursor<'a>,
     _: &mut Attributes<'_, 'a>,
-) -> Result<Vec<u32>, Problem> {
+) -> Result<Vec<[u32; 3]>, Problem> {
     Err(Problem::unsupported(
         e.path(),
         "is compressed, which this build cannot read",
@@ -137,36 +137,83 @@ fn compressed<'a>(
     ))
 }
 
-/// The indices of a primitive, if it has any. Where they name fewer vertices than there are, as
-/// when many primitives share one array, only those are picked.
+/// In which order a primitive takes its vertices.
+enum Order {
+    /// As they come.
+    Plain,
+    /// One after the other.
+    Listed(Vec<u32>),
+    /// By threes, as they stay: long lists are not copied.
+    Triangles(Vec<[u32; 3]>),
+}
+
+impl Order {
+    /// The vertices; `None` if they are taken as they come.
+    fn flat(&mut self) -> Option<&mut [u32]> {
+        match self {
+            Self::Plain => None,
+            Self::Listed(list) => Some(list),
+            Self::Triangles(list) => Some(list.as_flattened_mut()),
+        }
+    }
+
+    /// Triangles of a list (mode 4), strip (5) or fan (6) of `n` vertices; strips alternate their
+    /// winding (glTF 2.0, 3.7.2.1).
+    fn triangles(self, n: usize, mode: usize) -> Vec<[u32; 3]> {
+        let list = match self {
+            Self::Triangles(list) => return list,
+            Self::Listed(list) => list,
+            Self::Plain => {
+                return (0..triangle_count(n, mode))
+                    .map(|t| corners(t, mode).map(|k| k as u32))
+                    .collect();
+            }
+        };
+        (0..triangle_count(list.len(), mode))
+            .map(|t| corners(t, mode).map(|k| list[k]))
+            .collect()
+    }
+}
+
+/// The order of a primitive. Where its indices name fewer vertices than there are, as when many
+/// primitives share one array, only those are picked.
 fn order<'a>(
     p: &Cursor<'a>,
     attributes: &mut Attributes<'_, 'a>,
     position: &Cursor<'a>,
-) -> Result<Option<Vec<u32>>, Problem> {
+    mode: usize,
+) -> Result<Order, Problem> {
     let n = attributes.count;
     let Some(indices) = p.get("indices") else {
         return match u32::try_from(n) {
-            Ok(_) => Ok(None),
+            Ok(_) => Ok(Order::Plain),
             Err(_) => Err(position.problem("has too many vertices")),
         };
     };
-    let mut order = attributes.source.indices(&indices)?;
-    if let Some(i) = order.iter().copied().max().filter(|&i| i as usize >= n) {
+    let triples = match mode {
+        4 => attributes.source.triples(&indices)?,
+        _ => None,
+    };
+    let mut order = match triples {
+        Some(list) => Order::Triangles(list),
+        None => Order::Listed(attributes.source.indices(&indices)?),
+    };
+    let flat = order.flat().unwrap_or_default();
+    if let Some(i) = flat.iter().copied().max().filter(|&i| i as usize >= n) {
         return Err(indices.problem(format!("index {i} is out of range: there are {n} vertices")));
     }
-    if order.len() < n {
-        let mut used = order.clone();
+    if flat.len() < n {
+        let mut used = flat.to_vec();
         used.sort_unstable();
         used.dedup();
         if used.len() < n {
-            for i in &mut order {
+            for i in flat {
                 *i = used.binary_search(i).unwrap_or_default() as u32;
             }
             attributes.pick = Some(Arc::new(used));
         }
     }
-    Ok(Some(order))
+    Ok(order)
 }
 
 /// Refuses normals without length, except on triangles without area, which nothing ever hits.
@@ -193,13 +240,14 @@ fn check_normals(
 }
 
 /// The spheres of points, each once.
-fn spheres(v: &Vertices, order: Option<Vec<u32>>) -> SphereSet {
+fn spheres(v: &Vertices, mut order: Order) -> SphereSet {
     let one = |i: usize| {
         let ([x, y, z], [r]) = (v.positions[i], v.radii[i]);
         [x, y, z, r]
     };
-    let spheres = match order {
-        Some(mut order) => {
+    let spheres = match order.flat() {
+        Some(order) => {
+            let mut order = order.to_vec();
             order.sort_unstable();
             order.dedup();
             order.into_iter().map(|i| one(i as usize)).collect()
@@ -207,22 +255,6 @@ fn spheres(v: &Vertices, order: Option<Vec<u32>>) -> SphereSet {
         None => (0..v.positions.len()).map(one).collect(),
     };
     SphereSet { spheres }
-}
-
-/// Triangles of a list (mode 4), strip (5) or fan (6); strips alternate their winding
-/// (glTF 2.0, 3.7.2.1).
-fn triangles(order: Option<Vec<u32>>, n: usize, mode: usize) -> Vec<[u32; 3]> {
-    let Some(order) = order else {
-        return (0..triangle_count(n, mode))
-            .map(|t| corners(t, mode).map(|k| k as u32))
-            .collect();
-    };
-    if mode == 4 {
-        return order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-    }
-    (0..triangle_count(order.len(), mode))
-        .map(|t| corners(t, mode).map(|k| order[k]))
-        .collect()
 }
 
 /// Number of triangles that `n` vertices make.
@@ -249,12 +281,14 @@ mod tests {
 
     #[test]
     fn strips_and_fans_keep_their_winding() {
-        for order in [Some(vec![0, 1, 2, 3]), None] {
-            let triangles = |mode| triangles(order.clone(), 4, mode);
+        let listed = || Order::Listed(vec![0, 1, 2, 3]);
+        for order in [listed, || Order::Plain] {
+            let triangles = |mode| order().triangles(4, mode);
             assert_eq!(triangles(5), [[0, 1, 2], [1, 3, 2]]);
             assert_eq!(triangles(6), [[1, 2, 0], [2, 3, 0]]);
             assert_eq!(triangles(4), [[0, 1, 2]]);
         }
-        assert!(triangles(Some(vec![]), 9, 6).is_empty() && triangles(None, 1, 5).is_empty());
+        let none = Order::Listed(vec![]).triangles(9, 6);
+        assert!(none.is_empty() && Order::Plain.triangles(1, 5).is_empty());
     }
 }

@@ -1,6 +1,9 @@
 //! Buffer views that `EXT_meshopt_compression` or its successor `KHR_meshopt_compression` packs.
 //! The decoder is meshoptimizer's own, which is written for data that nobody vouches for.
 
+use std::sync::Arc;
+
+use bytemuck::Pod;
 use meshopt::{
     decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat,
     decode_index_buffer, decode_index_sequence, decode_vertex_buffer,
@@ -9,7 +12,7 @@ use meshopt::{
 use super::Problem;
 use super::json::Cursor;
 
-/// A vertex of `N` 32-bit words.
+/// A vertex of more than 32 words of 32 bits, up to which arrays have a default.
 #[derive(Clone)]
 #[repr(transparent)]
 struct Words<const N: usize>([u32; N]);
@@ -91,43 +94,51 @@ impl Packed {
         })
     }
 
-    /// The unpacked bytes; `None` if `bytes` are damaged.
-    pub(super) fn decode(&self, bytes: &[u8]) -> Option<Vec<u8>> {
+    /// The unpacked bytes, in parts that begin at the ascending `bounds`; `None` if `bytes` are
+    /// damaged.
+    pub(super) fn decode(&self, bytes: &[u8], bounds: &[usize]) -> Option<Vec<Arc<[u8]>>> {
         let n = self.count;
-        Some(match (self.mode, self.filter, self.stride) {
-            (Mode::Triangles, _, 2) => shorts(&decode_index_buffer::<u16>(bytes, n).ok()?),
-            (Mode::Triangles, ..) => words(decode_index_buffer::<u32>(bytes, n).ok()?),
-            (Mode::Indices, _, 2) => shorts(&decode_index_sequence::<u16>(bytes, n).ok()?),
-            (Mode::Indices, ..) => words(decode_index_sequence::<u32>(bytes, n).ok()?),
-            (_, Filter::None, _) => words(self.vertices(bytes)?),
-            (_, Filter::Exponential, _) => {
-                let mut out: Vec<[u32; 1]> =
-                    self.vertices(bytes)?.into_iter().map(|w| [w]).collect();
-                decode_filter_exp(&mut out);
-                words(out.into_iter().flatten())
+        let short = self.stride == 2;
+        Some(match (self.mode, self.filter) {
+            (Mode::Triangles, _) if short => {
+                split(shorts(decode_index_buffer::<u16>(bytes, n).ok()?), bounds)
             }
-            (_, Filter::Quaternion, _) => {
+            (Mode::Triangles, _) => {
+                split(words(decode_index_buffer::<u32>(bytes, n).ok()?), bounds)
+            }
+            (Mode::Indices, _) if short => {
+                split(shorts(decode_index_sequence::<u16>(bytes, n).ok()?), bounds)
+            }
+            (Mode::Indices, _) => {
+                split(words(decode_index_sequence::<u32>(bytes, n).ok()?), bounds)
+            }
+            (_, Filter::None) => split(words(self.vertices(bytes)?), bounds),
+            (_, Filter::Exponential) => {
+                let mut out = self.vertices(bytes)?;
+                decode_filter_exp::<1>(bytemuck::cast_slice_mut(&mut out));
+                split(words(out), bounds)
+            }
+            (_, Filter::Quaternion) => {
                 let mut out: Vec<[i16; 4]> = decode_vertex_buffer(bytes, n).ok()?;
                 decode_filter_quat(&mut out);
-                let flat: Vec<u16> = out.into_iter().flatten().map(|x| x as u16).collect();
-                shorts(&flat)
+                let flat = out.into_flattened().into_iter().map(|x| x as u16);
+                split(shorts(flat.collect()), bounds)
             }
-            (_, filter, 4) => {
+            (_, filter) if self.stride == 4 => {
                 let mut out: Vec<[u8; 4]> = decode_vertex_buffer(bytes, n).ok()?;
                 match filter {
                     Filter::Color => decode_filter_color(&mut out),
                     _ => decode_filter_oct(&mut out),
                 }
-                out.into_iter().flatten().collect()
+                split(out.into_flattened(), bounds)
             }
-            (_, filter, _) => {
+            (_, filter) => {
                 let mut out: Vec<[u16; 4]> = decode_vertex_buffer(bytes, n).ok()?;
                 match filter {
                     Filter::Color => decode_filter_color(&mut out),
                     _ => decode_filter_oct(&mut out),
                 }
-                let flat: Vec<u16> = out.into_iter().flatten().collect();
-                shorts(&flat)
+                split(shorts(out.into_flattened()), bounds)
             }
         })
     }
@@ -135,26 +146,50 @@ impl Packed {
     /// Vertices as words; the library takes their size as a type.
     fn vertices(&self, bytes: &[u8]) -> Option<Vec<u32>> {
         macro_rules! by_size {
-            ($($words:literal)*) => {
+            ($($small:literal)*; $($large:literal)*) => {
                 match self.stride / 4 {
-                    $($words => {
-                        let out = decode_vertex_buffer::<Words<$words>>(bytes, self.count).ok()?;
-                        Some(out.into_iter().flat_map(|w| w.0).collect())
+                    $($small => {
+                        let out: Vec<[u32; $small]> = decode_vertex_buffer(bytes, self.count).ok()?;
+                        Some(out.into_flattened())
+                    })*
+                    $($large => {
+                        let out: Vec<Words<$large>> = decode_vertex_buffer(bytes, self.count).ok()?;
+                        let mut flat = Vec::with_capacity(self.count * $large);
+                        out.iter().for_each(|w| flat.extend_from_slice(&w.0));
+                        Some(flat)
                     })*
                     _ => None,
                 }
             };
         }
         by_size!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30
-            31 32 33 34 35 36 37 38 39 40 41 42 43 44 45 46 47 48 49 50 51 52 53 54 55 56 57 58 59
+            31 32; 33 34 35 36 37 38 39 40 41 42 43 44 45 46 47 48 49 50 51 52 53 54 55 56 57 58 59
             60 61 62 63 64)
     }
 }
 
-fn words(values: impl IntoIterator<Item = u32>) -> Vec<u8> {
-    values.into_iter().flat_map(u32::to_le_bytes).collect()
+/// Words in the order of bytes that files have.
+fn words(mut values: Vec<u32>) -> Vec<u32> {
+    values.iter_mut().for_each(|x| *x = x.to_le());
+    values
 }
 
-fn shorts(values: &[u16]) -> Vec<u8> {
-    values.iter().flat_map(|x| x.to_le_bytes()).collect()
+fn shorts(mut values: Vec<u16>) -> Vec<u16> {
+    values.iter_mut().for_each(|x| *x = x.to_le());
+    values
+}
+
+/// Parts of `all` that begin at the bytes `bounds`. It shrinks as they grow.
+fn split<T: Pod>(mut all: Vec<T>, bounds: &[usize]) -> Vec<Arc<[u8]>> {
+    let mut end = size_of::<T>() * all.len();
+    let mut parts = Vec::new();
+    for &start in bounds.iter().rev() {
+        let start = start.min(end);
+        parts.push(Arc::from(&bytemuck::cast_slice(&all)[start..end]));
+        all.truncate(start.div_ceil(size_of::<T>()));
+        all.shrink_to_fit();
+        end = start;
+    }
+    parts.reverse();
+    parts
 }

@@ -37,6 +37,8 @@ mod solid;
 mod sources;
 mod tangents;
 mod texture;
+#[cfg(feature = "meshopt")]
+mod unpacked;
 mod used;
 mod variants;
 mod vertices;

@@ -3,12 +3,16 @@
 use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
+#[cfg(feature = "meshopt")]
+use serde_json::Value;
 
 use super::accessor::Source;
 use super::hierarchy::Hierarchy;
 use super::json::Cursor;
 use super::mesh::{Part, Shaping};
 use super::skin::Skin;
+#[cfg(feature = "meshopt")]
+use super::unpacked::Users;
 use super::{
     Notes, Problem, camera, implicit, instancing, light, mesh, morph, solid, tangents, variants,
 };
@@ -276,11 +280,18 @@ impl<'a> Walker<'a, '_> {
         posed: &mut [Posed<'a>],
     ) -> Result<Vec<Option<Made>>, Problem> {
         let source = self.source;
+        #[cfg(feature = "meshopt")]
+        let users = {
+            let accessors = jobs.iter().flat_map(Job::accessors);
+            Users::new(&source.root, &source.views.unpacked, accessors)
+        };
         let done: Vec<_> = jobs
             .par_iter()
             .map(|job| {
                 let mut notes = Notes::default();
                 let part = job.read(source, &posed[job.posed], &mut notes);
+                #[cfg(feature = "meshopt")]
+                job.accessors().into_iter().for_each(|a| users.done(a));
                 (part, notes)
             })
             .collect();
@@ -380,6 +391,18 @@ impl<'a> Walker<'a, '_> {
 }
 
 impl<'a> Job<'a> {
+    /// The accessors that it reads.
+    #[cfg(feature = "meshopt")]
+    fn accessors(&self) -> Vec<usize> {
+        let p = &self.primitive;
+        let targets = p.items("targets").unwrap_or_default();
+        let maps = p.get("attributes").into_iter().chain(targets);
+        let values = maps.filter_map(|m| m.value().as_object().map(|o| o.values()));
+        let mut all: Vec<_> = values.flatten().filter_map(Value::as_u64).collect();
+        all.extend(p.get("indices").and_then(|i| i.value().as_u64()));
+        all.into_iter().map(|i| i as usize).collect()
+    }
+
     fn read(
         &self,
         source: &Source<'a>,

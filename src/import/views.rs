@@ -1,15 +1,18 @@
 //! Buffer views: ranges of buffers, with a bound on what all of them together may grow to.
 
-use std::borrow::Cow;
 #[cfg(feature = "meshopt")]
-use std::sync::OnceLock;
+use std::collections::HashMap;
+#[cfg(feature = "meshopt")]
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::Problem;
-use super::buffer::Buffer;
+use super::buffer::{Buffer, Bytes};
 use super::json::Cursor;
 #[cfg(feature = "meshopt")]
 use super::meshopt::Packed;
+#[cfg(feature = "meshopt")]
+use super::unpacked::{self, Unpacked};
 
 /// The buffer views of a file.
 pub(super) struct Views<'a> {
@@ -19,7 +22,7 @@ pub(super) struct Views<'a> {
     budget: AtomicUsize,
     /// What compressed views hold, once somebody asked for it.
     #[cfg(feature = "meshopt")]
-    unpacked: Vec<OnceLock<Result<Vec<u8>, Problem>>>,
+    pub(super) unpacked: HashMap<usize, Unpacked>,
 }
 
 /// A buffer view.
@@ -36,8 +39,9 @@ pub(super) struct View<'a> {
 enum Data<'a> {
     /// From this byte on in a buffer.
     Plain(&'a Buffer, usize),
+    /// Compressed by what the extension object says, which lies in this view.
     #[cfg(feature = "meshopt")]
-    Unpacked(&'a [u8]),
+    Packed(&'a Unpacked, Box<(Packed, View<'a>)>),
 }
 
 /// The extensions that compress a view. They differ in name only.
@@ -53,12 +57,7 @@ impl<'a> Views<'a> {
     pub(super) fn new(root: Cursor<'a>, buffers: &'a [Buffer], size: usize) -> Self {
         Self {
             #[cfg(feature = "meshopt")]
-            unpacked: {
-                let views = root.get("bufferViews").and_then(|v| v.value().as_array());
-                (0..views.map_or(0, Vec::len))
-                    .map(|_| OnceLock::new())
-                    .collect()
-            },
+            unpacked: unpacked::all(&root),
             root,
             buffers,
             budget: AtomicUsize::new(size.saturating_mul(GROWTH).saturating_add(BUDGET)),
@@ -88,17 +87,19 @@ impl<'a> Views<'a> {
         let stride = at.index_or("byteStride", 0)?;
         let packed = COMPRESSION.iter().find_map(|name| at.extension(name));
         #[cfg(feature = "meshopt")]
-        if let (Some(e), Some(slot)) = (&packed, self.unpacked.get(index)) {
-            let bytes = slot.get_or_init(|| self.unpack(e));
-            return match bytes {
-                Ok(bytes) => Ok(View {
-                    len: bytes.len(),
-                    at,
-                    stride,
-                    data: Data::Unpacked(bytes),
-                }),
-                Err(problem) => Err(problem.clone()),
-            };
+        if let (Some(e), Some(unpacked)) = (&packed, self.unpacked.get(&index)) {
+            let packed = Packed::read(e)?;
+            let from = self.range(e.clone(), 0)?;
+            unpacked.fill(|bounds| {
+                self.claim(packed.count.saturating_mul(packed.stride), e)?;
+                from.unpack(&packed, bounds)
+            })?;
+            return Ok(View {
+                len: packed.count * packed.stride,
+                at,
+                stride,
+                data: Data::Packed(unpacked, Box::new((packed, from))),
+            });
         }
         let view = self.range(at, stride)?;
         if let (Some(e), Data::Plain(Buffer::Absent { .. }, _)) = (packed, &view.data) {
@@ -111,20 +112,8 @@ impl<'a> Views<'a> {
         Ok(view)
     }
 
-    /// What the extension object `e` compresses.
-    #[cfg(feature = "meshopt")]
-    fn unpack(&self, e: &Cursor<'a>) -> Result<Vec<u8>, Problem> {
-        let packed = Packed::read(e)?;
-        let view = self.range(e.clone(), 0)?;
-        self.claim(packed.count.saturating_mul(packed.stride), e)?;
-        let bytes = view.read(0, view.len)?;
-        packed
-            .decode(&bytes)
-            .ok_or_else(|| e.problem("cannot be decoded: its bytes are damaged"))
-    }
-
     /// The bytes of the view whose index stands at `from`.
-    pub(super) fn bytes(&self, from: &Cursor<'a>) -> Result<Cow<'_, [u8]>, Problem> {
+    pub(super) fn bytes(&self, from: &Cursor<'a>) -> Result<Bytes<'_>, Problem> {
         let view = self.get(from)?;
         view.read(0, view.len)
     }
@@ -156,16 +145,32 @@ impl<'a> Views<'a> {
 
 impl<'a> View<'a> {
     /// `len` bytes from `at` on.
-    pub(super) fn read(&self, at: usize, len: usize) -> Result<Cow<'a, [u8]>, Problem> {
+    pub(super) fn read(&self, at: usize, len: usize) -> Result<Bytes<'a>, Problem> {
         if at.checked_add(len).is_none_or(|end| end > self.len) {
             return Err(self.at.problem(format!("ends before byte {at} + {len}")));
         }
-        match self.data {
+        match &self.data {
             Data::Plain(buffer, start) => buffer
                 .read(start + at, len)
                 .map_err(|e| self.at.problem(format!("cannot be read ({e})"))),
             #[cfg(feature = "meshopt")]
-            Data::Unpacked(bytes) => Ok(Cow::Borrowed(&bytes[at..at + len])),
+            Data::Packed(unpacked, packed) => match unpacked.read(at, len) {
+                Some(bytes) => Ok(bytes),
+                // Who asks for it as a whole gets it for himself.
+                None => {
+                    let (packed, from) = packed.as_ref();
+                    let whole = from.unpack(packed, &[0])?.swap_remove(0);
+                    Ok(Bytes::Shared(whole, at, len))
+                }
+            },
         }
+    }
+
+    /// What `packed` compresses in this view, in parts with these bounds.
+    #[cfg(feature = "meshopt")]
+    fn unpack(&self, packed: &Packed, bounds: &[usize]) -> Result<Vec<Arc<[u8]>>, Problem> {
+        let bytes = self.read(0, self.len)?;
+        let parts = packed.decode(&bytes, bounds);
+        parts.ok_or_else(|| self.at.problem("cannot be decoded: its bytes are damaged"))
     }
 }

@@ -186,6 +186,7 @@ fn photons(
         roulette: options.roulette,
     };
     pipeline::in_pool(settings.threads, || {
+        scene.geometry.prepare();
         let accel = (backend.build)(&scene.geometry, rayon::current_num_threads())?;
         let view = View {
             scene,

@@ -99,11 +99,6 @@ pub(super) fn bake(
             name: Arc::from(p.name),
         });
     }
-    for shape in &mut geometry.shapes {
-        if let Shape::Mesh(mesh) = shape {
-            mesh.prepare();
-        }
-    }
     geometry
 }
 

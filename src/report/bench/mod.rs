@@ -217,6 +217,7 @@ fn import(
 
 fn build(scene: &Scene, backend: &str, registry: &Registry) -> Result<Box<dyn Accelerator>> {
     let entry = registry.accelerators.find(backend)?;
+    scene.geometry.prepare();
     (entry.build)(&scene.geometry, rayon::current_num_threads())
 }
 
