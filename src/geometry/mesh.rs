@@ -25,6 +25,13 @@ impl Invalid {
     }
 }
 
+/// What is wrong with a triangle.
+enum Fault {
+    Index,
+    Coordinate,
+    Degenerate,
+}
+
 /// Largest coordinate a backend can hold (Embree drops primitives beyond 1.844e18 silently).
 pub(super) const COORDINATE_LIMIT: f32 = 1e18;
 
@@ -54,26 +61,43 @@ const PREPARED: usize = 4096;
 impl TriangleMesh {
     /// Drops triangles that no backend can hold or that have no area, and says how many.
     pub fn drop_invalid(&mut self) -> Invalid {
-        let mut dropped = Invalid::default();
+        /// Triangles that a thread takes at a time.
+        const CHUNK: usize = 1 << 13;
         let positions = &self.positions;
-        self.indices.retain(|tri| {
+        let fault = |tri: &[u32; 3]| {
             let Some(v) = corners(positions, *tri) else {
-                dropped.index += 1;
-                return false;
+                return Some(Fault::Index);
             };
             if v.iter()
                 .any(|p| p.iter().any(|c| !(c.abs() <= COORDINATE_LIMIT)))
             {
-                dropped.coordinate += 1;
-                return false;
+                return Some(Fault::Coordinate);
             }
             let [a, b, c] = v.map(|p| Vec3::from(p).as_dvec3());
-            if (b - a).cross(c - a) == DVec3::ZERO {
-                dropped.degenerate += 1;
-                return false;
-            }
-            true
-        });
+            ((b - a).cross(c - a) == DVec3::ZERO).then_some(Fault::Degenerate)
+        };
+        // Most meshes have none, and all threads find that.
+        let chunks = self.indices.par_chunks(CHUNK);
+        let dropped = chunks
+            .map(|chunk| {
+                let mut n = Invalid::default();
+                for fault in chunk.iter().filter_map(fault) {
+                    match fault {
+                        Fault::Index => n.index += 1,
+                        Fault::Coordinate => n.coordinate += 1,
+                        Fault::Degenerate => n.degenerate += 1,
+                    }
+                }
+                n
+            })
+            .reduce(Invalid::default, |a, b| Invalid {
+                index: a.index + b.index,
+                coordinate: a.coordinate + b.coordinate,
+                degenerate: a.degenerate + b.degenerate,
+            });
+        if dropped.total() > 0 {
+            self.indices.retain(|tri| fault(tri).is_none());
+        }
         dropped
     }
 
@@ -204,5 +228,17 @@ mod tests {
         );
         assert_eq!(dropped.total(), 5);
         assert_eq!(mesh.indices, [[0, 1, 2]]);
+        assert_eq!(mesh.drop_invalid(), Invalid::default());
+
+        // As many as several threads share, in their order.
+        let (good, none) = ([[0, 1, 2], [1, 2, 0], [2, 0, 1]], [0, 0, 1]);
+        let keep = |i: usize| !i.is_multiple_of(7);
+        let all = |i: usize| if keep(i) { good[i % 3] } else { none };
+        let n = 100_000;
+        mesh.indices = (0..n).map(all).collect();
+        let dropped = mesh.drop_invalid();
+        assert_eq!((dropped.degenerate, dropped.total()), (14286, 14286));
+        let kept: Vec<_> = (0..n).filter(|i| keep(*i)).map(|i| good[i % 3]).collect();
+        assert_eq!(mesh.indices, kept);
     }
 }

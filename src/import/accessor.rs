@@ -7,6 +7,8 @@ use rayon::prelude::*;
 
 use super::Problem;
 use super::buffer::{Buffer, Bytes};
+#[cfg(feature = "draco")]
+use super::gate::Gate;
 use super::json::Cursor;
 use super::views::{View, Views};
 
@@ -14,6 +16,9 @@ use super::views::{View, Views};
 pub(super) struct Source<'a> {
     pub(super) root: Cursor<'a>,
     pub(super) views: Views<'a>,
+    /// Before decoders that take much memory.
+    #[cfg(feature = "draco")]
+    pub(super) gate: Gate,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,6 +95,8 @@ impl<'a> Source<'a> {
     pub(super) fn new(root: Cursor<'a>, buffers: &'a [Buffer], size: usize) -> Self {
         Self {
             views: Views::new(root.clone(), buffers, size),
+            #[cfg(feature = "draco")]
+            gate: Gate::new(super::draco::total(&root)),
             root,
         }
     }

@@ -1,28 +1,67 @@
 //! Primitives that `KHR_draco_mesh_compression` packs.
 
-use draco_core::{DecodeLimits, DecoderBuffer, Mesh, MeshDecoder};
+use std::sync::{Mutex, PoisonError};
 
-use super::Problem;
+use draco_core::{
+    DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointCloud,
+    PointIndex,
+};
+
 use super::accessor::{Accessor, Component, Source};
 use super::json::Cursor;
+use super::{Problem, mesh};
 
-/// A decoded primitive: indices and the attributes that are in it.
+/// A decoded primitive: the attributes that are in it, until they are read.
 pub(super) struct Draco<'a> {
-    mesh: Mesh,
+    cloud: Mutex<PointCloud>,
     /// From names of attributes to their ids in the stream.
     ids: Cursor<'a>,
-    at: Cursor<'a>,
+}
+
+/// How much more than what it makes the decoder needs while it works: it holds the edges of all
+/// triangles beside the mesh. Measured for triangles with normals and texture coordinates.
+const EFFORT: usize = 4;
+
+/// Bytes that all compressed primitives of the document `root` will take.
+pub(super) fn total(root: &Cursor<'_>) -> usize {
+    let accessors = root.items("accessors").unwrap_or_default();
+    let count = |at: Option<Cursor<'_>>| {
+        let accessor = at.and_then(|at| accessors.get(at.index().ok()?));
+        accessor.map_or(0, |a| a.index_or("count", 0).unwrap_or(0))
+    };
+    let meshes = root.items("meshes").unwrap_or_default();
+    let primitives = meshes
+        .iter()
+        .flat_map(|m| m.items("primitives").unwrap_or_default());
+    primitives
+        .filter_map(|p| {
+            let e = p.extension(mesh::DRACO)?;
+            let attributes = p.get("attributes")?;
+            let vertices = count(attributes.get("POSITION"));
+            Some(size(&e, vertices, count(p.get("indices"))))
+        })
+        .fold(0, usize::saturating_add)
+}
+
+/// Bytes of a primitive: 12 for each vertex in each attribute, more or less, and its indices.
+fn size(e: &Cursor<'_>, vertices: usize, indices: usize) -> usize {
+    let ids = e.get("attributes");
+    let names = ids.and_then(|a| a.value().as_object().map(serde_json::Map::len));
+    let vertex = names.unwrap_or(0).saturating_mul(12);
+    vertices
+        .saturating_mul(vertex)
+        .saturating_add(indices.saturating_mul(4))
 }
 
 impl<'a> Draco<'a> {
-    /// Decodes what the extension object `e` names; the primitive has `vertices` vertices, and
-    /// `indices` indices.
+    /// Decodes what the extension object `e` names, and gives its triangles, too; the primitive has
+    /// `vertices` vertices, and `indices` indices.
     pub(super) fn decode(
         e: &Cursor<'a>,
         source: &Source<'a>,
         vertices: usize,
         indices: usize,
-    ) -> Result<Self, Problem> {
+    ) -> Result<(Self, Vec<[u32; 3]>), Problem> {
         let ids = e.need("attributes")?;
         let names = ids.value().as_object().map_or(0, serde_json::Map::len);
         // Up to four 32-bit numbers in each attribute. What the accessors promise is the bound.
@@ -31,39 +70,60 @@ impl<'a> Draco<'a> {
             .saturating_mul(names.max(1))
             .saturating_add(indices.saturating_mul(4));
         source.views.claim(bytes, e)?;
-        let packed = source.views.bytes(&e.need("bufferView")?)?;
         let limits = DecodeLimits::default()
             .with_max_points(vertices as u64)
             .with_max_faces(indices as u64)
             .with_max_decoded_bytes((bytes as u64).saturating_mul(2).saturating_add(1 << 20));
-        let mut mesh = Mesh::new();
-        MeshDecoder::new()
-            .decode(
-                &mut DecoderBuffer::new(&packed).with_limits(limits),
-                &mut mesh,
-            )
-            .map_err(|error| e.problem(format!("cannot be decoded ({error})")))?;
+        let packed = source.views.get(&e.need("bufferView")?)?;
+        let size = size(e, vertices, indices);
+        let mesh = source.gate.pass(size.saturating_mul(EFFORT), size, || {
+            let packed = packed.read(0, packed.len)?;
+            let mut mesh = Mesh::new();
+            MeshDecoder::new()
+                .decode(
+                    &mut DecoderBuffer::new(&packed).with_limits(limits),
+                    &mut mesh,
+                )
+                .map_err(|error| e.problem(format!("cannot be decoded ({error})")))?;
+            Ok::<_, Problem>(mesh)
+        })?;
         if mesh.num_points() != vertices {
             return Err(e.problem(format!(
                 "holds {} vertices, the accessors say {vertices}",
                 mesh.num_points()
             )));
         }
-        Ok(Self {
-            mesh,
+        let order: Vec<[u32; 3]> = mesh.faces().iter().map(|t| t.map(|i| i.0)).collect();
+        if let Some(i) = order.iter().flatten().find(|&&i| i as usize >= vertices) {
+            return Err(e.problem(format!("index {i} is out of range")));
+        }
+        let draco = Self {
+            cloud: Mutex::new(mesh.into_point_cloud()),
             ids,
-            at: e.clone(),
-        })
+        };
+        Ok((draco, order))
     }
 
-    /// Its triangles.
-    pub(super) fn indices(&self) -> Result<Vec<[u32; 3]>, Problem> {
-        let n = self.mesh.num_points();
-        let order: Vec<[u32; 3]> = self.mesh.faces().iter().map(|t| t.map(|i| i.0)).collect();
-        match order.iter().flatten().find(|&&i| i as usize >= n) {
-            Some(i) => Err(self.at.problem(format!("index {i} is out of range"))),
-            None => Ok(order),
+    /// The attribute with this id in the stream and the number of vertices. It is gone then, unless
+    /// several names share it.
+    fn take(&self, id: &Cursor<'a>) -> Result<(PointAttribute, usize), Problem> {
+        let mut cloud = self.cloud.lock().unwrap_or_else(PoisonError::into_inner);
+        let unique = u32::try_from(id.index()?).unwrap_or(u32::MAX);
+        let at = cloud.attribute_id_by_unique_id(unique);
+        let n = cloud.num_points();
+        let Some(attribute) = (at >= 0).then(|| cloud.attribute_mut(at)) else {
+            return Err(id.problem("names an attribute that is not in the stream"));
+        };
+        let all = self.ids.value().as_object();
+        let same = |v: &&serde_json::Value| v.as_u64() == Some(u64::from(unique));
+        let shared = all.map_or(0, |ids| ids.values().filter(same).count()) > 1;
+        if shared {
+            return Ok((attribute.clone(), n));
         }
+        // What is left in its place must not be found by the id of another.
+        let mut empty = PointAttribute::new();
+        empty.set_unique_id(u32::MAX);
+        Ok((std::mem::replace(attribute, empty), n))
     }
 
     /// The attribute of `N` numbers that an accessor stands for, which says of which type they are;
@@ -77,19 +137,13 @@ impl<'a> Draco<'a> {
         let Some(id) = self.ids.get(name) else {
             return Ok(None);
         };
-        let known = u32::try_from(id.index()?)
-            .ok()
-            .and_then(|id| self.mesh.attribute_by_unique_id(id));
-        let Some(attribute) = known else {
-            return Err(id.problem("names an attribute that is not in the stream"));
-        };
+        let (attribute, n) = self.take(&id)?;
         if usize::from(attribute.num_components()) != N {
             return Err(id.problem(format!(
                 "has {} components, {N} are needed",
                 attribute.num_components()
             )));
         }
-        let flat = attribute.read_f32s(self.mesh.num_points(), N);
         let scale = match (accessor.normalized, accessor.component) {
             (true, Component::I8) => 127.0,
             (true, Component::U8) => 255.0,
@@ -104,6 +158,19 @@ impl<'a> Draco<'a> {
                 (x / scale).max(-1.0)
             }
         };
+        if attribute.data_type() == DataType::Float32 {
+            let (data, stride) = (attribute.buffer().data(), attribute.byte_stride() as usize);
+            let one = |i: usize| {
+                let at = attribute.mapped_index(PointIndex(i as u32)).0 as usize;
+                let bytes = at
+                    .checked_mul(stride)
+                    .and_then(|at| data.get(at..)?.get(..4 * N));
+                let words = bytes.map(|b| b.as_chunks::<4>().0);
+                std::array::from_fn(|k| words.map_or(0.0, |w| number(f32::from_le_bytes(w[k]))))
+            };
+            return Ok(Some((0..n).map(one).collect()));
+        }
+        let flat = attribute.read_f32s(n, N);
         Ok(Some(
             flat.chunks_exact(N)
                 .map(|c| std::array::from_fn(|k| number(c[k])))

@@ -118,8 +118,8 @@ fn compressed<'a>(
         Some(at) => attributes.source.accessor(&at)?.count,
         None => attributes.count,
     };
-    let draco = super::draco::Draco::decode(e, attributes.source, attributes.count, indices)?;
-    let order = draco.indices()?;
+    let (draco, order) =
+        super::draco::Draco::decode(e, attributes.source, attributes.count, indices)?;
     attributes.draco = Some(Arc::new(draco));
     Ok(order)
 }

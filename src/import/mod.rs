@@ -13,6 +13,8 @@ mod container;
 mod draco;
 mod environment;
 mod extras;
+#[cfg(feature = "draco")]
+mod gate;
 mod hierarchy;
 mod ignored;
 mod image;

@@ -1,7 +1,7 @@
 //! Glass without `KHR_materials_volume`: thin-walled by the specification, but what Blender's
 //! exporter writes of ordinary solid glass.
 
-use std::collections::{HashMap, HashSet};
+use rayon::prelude::*;
 
 use super::json::Cursor;
 use crate::geometry::TriangleMesh;
@@ -33,31 +33,50 @@ pub(super) fn twin(m: &Cursor<'_>, desc: &MaterialDesc) -> Option<MaterialDesc> 
 /// Vertices in one place are one, as seams of texture coordinates and changes of material split
 /// them; triangles without area do not count.
 pub(super) fn is_closed(parts: &[&TriangleMesh]) -> bool {
-    let mut known = HashMap::new();
-    let mut edges = HashSet::new();
+    // Adding zero makes one of both zeros.
+    let positions = || parts.iter().flat_map(|m| &m.positions);
+    let welded = weld(positions().map(|p| p.map(|x| (x + 0.0).to_bits())));
+    // Edges by their ends, those that go up and those that go down: lists, which are sorted, since
+    // tables would take more memory than the mesh.
+    let (mut up, mut down) = (Vec::new(), Vec::new());
+    let mut first = 0;
     for mesh in parts {
-        let welded: Vec<u32> = mesh
-            .positions
-            .iter()
-            .map(|p| {
-                // Adding zero makes one of both zeros.
-                let next = known.len() as u32;
-                *known.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(next)
-            })
-            .collect();
         for t in &mesh.indices {
-            let [a, b, c] = t.map(|i| welded[i as usize]);
+            let [a, b, c] = t.map(|i| u64::from(welded[first + i as usize]));
             if a == b || b == c || c == a {
                 continue;
             }
-            for edge in [(a, b), (b, c), (c, a)] {
-                if !edges.insert(edge) {
-                    return false;
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                if from < to {
+                    up.push(from << 32 | to);
+                } else {
+                    down.push(to << 32 | from);
                 }
             }
         }
+        first += mesh.positions.len();
     }
-    !edges.is_empty() && edges.iter().all(|&(a, b)| edges.contains(&(b, a)))
+    if up.is_empty() || up.len() != down.len() {
+        return false;
+    }
+    up.par_sort_unstable();
+    down.par_sort_unstable();
+    up == down && up.windows(2).all(|w| w[0] != w[1])
+}
+
+/// For each key the same number as for all keys that are equal.
+fn weld(keys: impl Iterator<Item = [u32; 3]>) -> Vec<u32> {
+    let mut sorted: Vec<([u32; 3], u32)> = keys.zip(0..).collect();
+    sorted.par_sort_unstable();
+    let mut numbers = vec![0; sorted.len()];
+    let mut number = 0;
+    for (i, (key, at)) in sorted.iter().enumerate() {
+        if i > 0 && sorted[i - 1].0 != *key {
+            number += 1;
+        }
+        numbers[*at as usize] = number;
+    }
+    numbers
 }
 
 #[cfg(test)]

@@ -225,33 +225,26 @@ impl Image {
         sum.map(|s| s / n as f64)
     }
 
-    /// Smallest and largest number of each channel as they are kept, by all threads.
+    /// Smallest and largest number of each channel, linear and as they are kept, by all threads.
     fn find_extremes(&self) -> [[f64; 4]; 2] {
-        /// Texels that one task looks at.
-        const CHUNK: usize = 1 << 16;
-        let none = [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
-        let texels = self.texels.len() / self.channels;
-        (0..texels.div_ceil(CHUNK))
-            .into_par_iter()
-            .map(|c| {
-                let mut range = none;
-                for i in c * CHUNK..((c + 1) * CHUNK).min(texels) {
-                    for (k, x) in self.at(i, Content::Data).into_iter().enumerate() {
-                        range[0][k] = range[0][k].min(x);
-                        range[1][k] = range[1][k].max(x);
-                    }
-                }
-                range
-            })
-            .reduce(
-                || none,
-                |a, b| {
-                    let pick = |end: usize, f: fn(f64, f64) -> f64| {
-                        std::array::from_fn(|k| f(a[end][k], b[end][k]))
-                    };
-                    [pick(0, f64::min), pick(1, f64::max)]
-                },
-            )
+        // Numbers grow with their codes, so the extremes of codes are those of numbers.
+        let expand = |ends: [[f64; 4]; 2]| {
+            ends.map(|e| expand(&e[..self.channels], 0, self.channels, |x| x, |x| x))
+        };
+        match &self.texels {
+            Texels::U8(v) => expand(
+                extremes(v, self.channels, [u8::MAX, u8::MIN])
+                    .map(|e| e.map(|t| LazyLock::force(&LINEAR_8)[usize::from(t)])),
+            ),
+            Texels::U16(v) => expand(
+                extremes(v, self.channels, [u16::MAX, u16::MIN])
+                    .map(|e| e.map(|t| f64::from(t) * (1.0 / 65535.0))),
+            ),
+            Texels::F32(v) => expand(
+                extremes(v, self.channels, [f32::INFINITY, f32::NEG_INFINITY])
+                    .map(|e| e.map(f64::from)),
+            ),
+        }
     }
 
     /// Smallest and largest value of each channel, linear.
@@ -272,6 +265,72 @@ impl Image {
             [r, g, b, a]
         })
     }
+}
+
+/// Smallest and largest number of each channel; `none` are those of nothing. Numbers that are none
+/// do not count.
+fn extremes<T: PartialOrd + Copy + Send + Sync>(
+    v: &[T],
+    channels: usize,
+    none: [T; 2],
+) -> [[T; 4]; 2] {
+    match channels {
+        1 => extremes_of::<T, 1>(v, none),
+        2 => extremes_of::<T, 2>(v, none),
+        3 => extremes_of::<T, 3>(v, none),
+        _ => extremes_of::<T, 4>(v, none),
+    }
+}
+
+fn extremes_of<T: PartialOrd + Copy + Send + Sync, const N: usize>(
+    v: &[T],
+    [most, least]: [T; 2],
+) -> [[T; 4]; 2] {
+    /// Texels that one task looks at.
+    const CHUNK: usize = 1 << 16;
+    /// Texels side by side that are looked at together, which becomes vector code.
+    const WIDE: usize = 16;
+    let smaller = |a: T, b: T| if b < a { b } else { a };
+    let larger = |a: T, b: T| if b > a { b } else { a };
+    let grow = |range: &mut [[T; N]; 2], t: &[T; N]| {
+        for k in 0..N {
+            range[0][k] = smaller(range[0][k], t[k]);
+            range[1][k] = larger(range[1][k], t[k]);
+        }
+    };
+    let join = |a: [[T; N]; 2], b: [[T; N]; 2]| {
+        [
+            std::array::from_fn(|k| smaller(a[0][k], b[0][k])),
+            std::array::from_fn(|k| larger(a[1][k], b[1][k])),
+        ]
+    };
+    let none = [[most; N], [least; N]];
+    let of = |chunk: &[[T; N]]| {
+        let (wide, rest) = chunk.as_chunks::<WIDE>();
+        let mut low = [[most; N]; WIDE];
+        let mut high = [[least; N]; WIDE];
+        for block in wide {
+            for i in 0..WIDE {
+                for k in 0..N {
+                    low[i][k] = smaller(low[i][k], block[i][k]);
+                    high[i][k] = larger(high[i][k], block[i][k]);
+                }
+            }
+        }
+        let mut range = low
+            .into_iter()
+            .zip(high)
+            .map(<[_; 2]>::from)
+            .fold(none, join);
+        for t in rest {
+            grow(&mut range, t);
+        }
+        range
+    };
+    let found = v.as_chunks::<N>().0.par_chunks(CHUNK).map(of);
+    let [low, high] = found.reduce(|| none, join);
+    let pad = |end: [T; N], none: T| std::array::from_fn(|k| *end.get(k).unwrap_or(&none));
+    [pad(low, most), pad(high, least)]
 }
 
 /// The four numbers of texel `i`: grey is all colours, and what has no alpha is whole.
@@ -315,3 +374,48 @@ static SRGB_16: LazyLock<Vec<f32>> = LazyLock::new(|| {
         .map(|i| srgb_to_linear(f64::from(i) / 65535.0) as f32)
         .collect()
 });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Codes that look random; the same every time.
+    fn codes(n: usize) -> impl Iterator<Item = u32> {
+        (0..n as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 7).wrapping_add(i / 3))
+    }
+
+    #[test]
+    fn extremes_are_those_of_all_texels() {
+        // Sizes around those of blocks and tasks.
+        for (width, height) in [(1, 1), (15, 1), (16, 3), (37, 29), (300, 257)] {
+            for channels in 1..=4 {
+                let n = (width * height) as usize * channels;
+                let some = |i: u32| 3 + i % 240;
+                let kinds = [
+                    Texels::U8(codes(n).map(|i| some(i) as u8).collect()),
+                    Texels::U16(codes(n).map(|i| (i % 65000) as u16).collect()),
+                    Texels::F32(codes(n).map(|i| (i % 9999) as f32 - 4e3).collect()),
+                ];
+                for texels in kinds {
+                    let image = Image::from_texels(width, height, channels, texels).unwrap();
+                    let mut ends = [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
+                    for i in 0..(width * height) as usize {
+                        for (k, x) in image.at(i, Content::Data).into_iter().enumerate() {
+                            ends[0][k] = ends[0][k].min(x);
+                            ends[1][k] = ends[1][k].max(x);
+                        }
+                    }
+                    assert_eq!(image.range(Content::Data), ends, "{image:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_no_extreme() {
+        let texels = Texels::F32(vec![f32::NAN, 2.0, -1.0, f32::NAN]);
+        let image = Image::from_texels(4, 1, 1, texels).unwrap();
+        let [low, high] = image.range(Content::Data);
+        assert_eq!((low[0], high[0]), (-1.0, 2.0));
+    }
+}
