@@ -262,6 +262,7 @@ fn no_damage_to_the_bytes_makes_it_panic() {
 fn real_files_load_or_say_why_not() {
     let folder = file("../shared/assets/real");
     let Ok(index) = fs::read_to_string(folder.join("index.tsv")) else {
+        eprintln!("skipped: {} is not there", folder.display());
         return;
     };
     let (mut loaded, mut refused) = (0, Vec::new());

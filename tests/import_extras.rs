@@ -88,6 +88,21 @@ fn area_lights_have_the_power_and_the_colour_they_name() {
 }
 
 #[test]
+fn why_occlusion_is_not_used_is_told_once() {
+    let mut a = Asset::triangle();
+    let occluded = json!({"occlusionTexture": {"index": 0, "strength": 0.5}});
+    a.json["materials"] = json!([occluded, occluded]);
+    a.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    // Not even its image has to be there.
+    a.json["textures"] = json!([{"source": 0}]);
+    a.json["images"] = json!([{"uri": "nowhere.png"}]);
+    assert_eq!(
+        a.read().unwrap().warnings,
+        ["occlusionTexture is not used: what it bakes, global illumination computes (2 times)"]
+    );
+}
+
+#[test]
 fn what_a_material_says_without_effect_is_told_by_its_name() {
     let material = |m: Value| {
         let mut a = Asset::triangle();
@@ -301,10 +316,33 @@ fn units_are_those_of_the_files_writer_unless_they_are_given() {
         assert!(scene.notes[0].contains(note), "{:?}", scene.notes);
         assert!(close(flux(&scene), 4.0 * PI));
     }
+    // Watts are what versions before 3.4 wrote, and those that did not yet tell theirs.
+    for old in ["glTF Blender I/O v3.3.27", "Blender glTF 2.0 I/O"] {
+        for (kind, want) in [("point", 683.0), ("spot", 683.0 / 4.0)] {
+            let mut a = with_light(json!({
+                "type": kind, "intensity": 683, "spot": {"outerConeAngle": PI / 2.0},
+            }));
+            a.json["asset"]["generator"] = json!(format!("Khronos {old}"));
+            let scene = a.read().unwrap();
+            let note = &scene.notes[0];
+            assert!(
+                note.contains("as watts") && note.contains("--light-units"),
+                "{note}"
+            );
+            assert!(close(flux(&scene), want), "{kind}: {}", flux(&scene));
+        }
+    }
+    let sun =
+        json!({"type": "directional", "intensity": 3, "extras": {"dualight": {"angle": 0.1}}});
+    let mut a = with_light(sun);
+    a.json["asset"]["generator"] = json!("Khronos glTF Blender I/O v1.8.19");
+    let l = a.read().unwrap().lights[0].escaped(DVec3::Z).g;
+    assert!(close(l, 3.0 / (PI * 0.05f64.sin().powi(2))), "{l}");
     for (light_units, factor) in [
         (LightUnits::Blender, 1.0),
         (LightUnits::Photometric, 1.0),
         (LightUnits::Radiometric, 683.0),
+        (LightUnits::Watts, 683.0 / (4.0 * PI)),
     ] {
         let options = ImportOptions {
             light_units,
@@ -333,6 +371,7 @@ fn what_surfaces_emit_is_in_the_units_of_the_lamps() {
         (LightUnits::Blender, 1.0),
         (LightUnits::Photometric, 1.0 / 683.0),
         (LightUnits::Radiometric, 1.0),
+        (LightUnits::Watts, 1.0),
         (LightUnits::Auto, 1.0),
     ] {
         let options = ImportOptions {
@@ -341,13 +380,21 @@ fn what_surfaces_emit_is_in_the_units_of_the_lamps() {
         };
         let scene = glowing().read_with(&options).unwrap();
         assert!(close(flux(&scene), factor * watts), "{light_units:?}");
+        let told = scene
+            .notes
+            .iter()
+            .any(|n| n.contains("no lamp is in the file"));
+        assert_eq!(told, light_units == LightUnits::Auto, "{:?}", scene.notes);
     }
     // What is unlit shines for nobody, whatever else the material says.
     let mut unlit = glowing();
     unlit.json["materials"][0]["extensions"]["KHR_materials_unlit"] = json!({});
     assert!(unlit.read().unwrap().lights.is_empty());
     // Beside a lamp the file's numbers are photometric, but Blender's are not.
-    for (generator, factor) in [("somebody", 1.0 / 683.0), ("Khronos glTF Blender I/O", 2.0)] {
+    for (generator, factor) in [
+        ("somebody", 1.0 / 683.0),
+        ("Khronos glTF Blender I/O v4.2.57", 2.0),
+    ] {
         let mut a = glowing();
         a.json["asset"]["generator"] = json!(generator);
         a.json["nodes"] = json!([
@@ -361,6 +408,64 @@ fn what_surfaces_emit_is_in_the_units_of_the_lamps() {
         let scene = a.read().unwrap();
         assert!(close(flux(&scene), want), "{generator}");
     }
+}
+
+#[test]
+fn how_a_lamp_spreads_its_light_depends_on_the_writer_and_not_on_the_units() {
+    // Half a watt per steradian in the middle, a smooth step of the cosine from there to the rim.
+    let spot = json!({
+        "type": "spot", "intensity": 0.5, "range": 0.5,
+        "spot": {"innerConeAngle": 0.0, "outerConeAngle": PI / 2.0},
+    });
+    for (generator, light_units, unit) in [
+        (
+            "Khronos glTF Blender I/O v5.0.21",
+            LightUnits::Radiometric,
+            1.0,
+        ),
+        (
+            "Khronos glTF Blender I/O v5.0.21",
+            LightUnits::Photometric,
+            1.0 / 683.0,
+        ),
+        (
+            "Khronos glTF Blender I/O v5.0.21",
+            LightUnits::Watts,
+            1.0 / (4.0 * PI),
+        ),
+        // Who asks for Blender's units says that it is Blender's file, whoever signed it.
+        ("gltfpack 0.16", LightUnits::Blender, 1.0 / 683.0),
+    ] {
+        let mut a = with_light(spot.clone());
+        a.json["asset"]["generator"] = json!(generator);
+        let options = ImportOptions {
+            light_units,
+            ..Default::default()
+        };
+        let scene = a.read_with(&options).unwrap();
+        // Cycles' curve leaves half of the half space's solid angle, glTF's a third of it.
+        assert!(
+            close(flux(&scene), 0.5 * PI * unit),
+            "{generator} {light_units:?}"
+        );
+        let far = scene.lights[0].sample_li(DVec3::new(0.0, 0.0, -7.0), [0.5; 2]);
+        let far = far.map_or(0.0, |l| l.radiance.g);
+        assert!(close(far, 0.5 * unit / 49.0), "{light_units:?}: {far}");
+    }
+    let mut a = with_light(spot);
+    a.json["asset"]["generator"] = json!("somebody");
+    let options = ImportOptions {
+        light_units: LightUnits::Radiometric,
+        ..Default::default()
+    };
+    let scene = a.read_with(&options).unwrap();
+    assert!(
+        close(flux(&scene), 0.5 * 2.0 * PI / 3.0),
+        "{}",
+        flux(&scene)
+    );
+    let far = scene.lights[0].sample_li(DVec3::new(0.0, 0.0, -7.0), [0.5; 2]);
+    assert_eq!(far.map_or(0.0, |l| l.radiance.g), 0.0);
 }
 
 #[test]

@@ -307,6 +307,7 @@ fn seeds() -> Vec<Seed> {
     ];
     while let Some(dir) = stack.pop() {
         let Ok(entries) = fs::read_dir(&dir) else {
+            eprintln!("without {}, which is not there", dir.display());
             continue;
         };
         let mut paths: Vec<PathBuf> = entries.flatten().map(|e| e.path()).collect();

@@ -458,6 +458,7 @@ fn blenders_animations_move_everything() {
     let path =
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/blender/anim.glb");
     if !path.exists() {
+        eprintln!("skipped: {} is not there", path.display());
         return;
     }
     let read = |options: &ImportOptions| {

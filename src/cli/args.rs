@@ -65,14 +65,16 @@ pub enum Command {
 /// What the numbers of a file's lights mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Units {
-    /// As Blender's if Blender's exporter wrote the file, otherwise photometric
+    /// By the exporter if it is Blender's (watts before its version 3.4), otherwise photometric
     Auto,
     /// As Blender's exporter writes them: watts times 683 for lamps
     Blender,
     /// Candela and lux, as glTF says; divided by 683 lm/W
     Photometric,
-    /// W/sr and W/m², taken as they are
+    /// W/sr and W/m², taken as they are; Blender's mode "Unitless"
     Radiometric,
+    /// Watts of points and spots, W/m² of suns: Blender before 3.4, and its mode "Raw"
+    Watts,
 }
 
 /// Which glass without a volume is solid.

@@ -289,6 +289,7 @@ pub fn import_options(args: &SceneArgs) -> ImportOptions {
             Units::Blender => LightUnits::Blender,
             Units::Photometric => LightUnits::Photometric,
             Units::Radiometric => LightUnits::Radiometric,
+            Units::Watts => LightUnits::Watts,
         },
         solid_glass: match args.solid_glass {
             Solid::Auto => SolidGlass::Auto,

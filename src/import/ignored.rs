@@ -12,8 +12,6 @@ const READ: &[(&str, &[&str])] = &[
             "name",
             "pbrMetallicRoughness",
             "normalTexture",
-            // Has a note of its own.
-            "occlusionTexture",
             "emissiveTexture",
             "emissiveFactor",
             "alphaMode",
@@ -126,6 +124,14 @@ pub(super) fn tell(m: &Cursor<'_>, root: &Cursor<'_>, notes: &mut Notes) -> Resu
                 continue;
             }
             let why = match key.as_str() {
+                "occlusionTexture" => {
+                    // Usual and no fault: once for all materials.
+                    notes.add(
+                        "occlusionTexture is not used: what it bakes, global illumination computes",
+                        1,
+                    );
+                    continue;
+                }
                 "thicknessTexture" => {
                     "light is absorbed along its way through the mesh, and thicknessFactor alone \
                      says whether the body is solid"

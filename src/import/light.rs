@@ -2,12 +2,13 @@
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
+use super::dialect::{self, Dialect};
 use super::json::Cursor;
 use super::node::Walker;
 use super::{Notes, Problem, extras};
 use crate::color::Rgb;
 use crate::color::units::{self, LightUnits};
-use crate::lights::{LightDesc, SpotCurve};
+use crate::lights::LightDesc;
 use crate::math::{DAffine3, DVec3};
 use crate::scene::SceneBuilder;
 
@@ -21,18 +22,11 @@ struct Extent {
     seen_by_camera: bool,
 }
 
-/// Whether the file was written by Blender's own exporter.
-pub(super) fn from_blender(root: &Cursor<'_>) -> bool {
-    root.get("asset")
-        .and_then(|a| a.get("generator"))
-        .and_then(|g| g.str().ok().map(|g| g.contains("Khronos glTF Blender I/O")))
-        .unwrap_or(false)
-}
-
 /// The units of what shines in a file: those asked for, or by who wrote it and what is in it.
-/// Tells the user what was chosen for lamps that are there.
+/// Tells the user what was chosen, why, and what else could be asked for.
 pub(super) fn resolve(
     asked: LightUnits,
+    dialect: Dialect,
     root: &Cursor<'_>,
     builder: &mut SceneBuilder,
 ) -> Result<LightUnits, Problem> {
@@ -43,21 +37,28 @@ pub(super) fn resolve(
         Some(e) => !e.items("lights")?.is_empty(),
         None => false,
     };
-    let (units, note) = match (from_blender(root), lamps) {
-        (true, _) => (
-            LightUnits::Blender,
-            "lights are taken as Blender exports them: divided by 683, spots by Cycles' curve",
-        ),
-        (false, true) => (
-            LightUnits::Photometric,
-            "lights are taken as candela and lux, emission as cd/m², at 683 lm/W",
-        ),
-        (false, false) => (LightUnits::Radiometric, ""),
-    };
-    if lamps {
-        builder.inform(note);
+    if let (true, Some((units, why))) = (lamps, dialect.lamps()) {
+        builder.inform(why);
+        return Ok(units);
     }
-    Ok(units)
+    if lamps {
+        builder.inform(
+            "lamps are taken as candela and lux and emission as cd/m², at 683 lm/W, as the \
+             specification says; --light-units radiometric takes them as watts",
+        );
+        return Ok(LightUnits::Photometric);
+    }
+    if dialect::emits(root) {
+        builder.inform(
+            "no lamp is in the file: what surfaces emit is taken as W/(m²·sr), for which \
+             --light-units photometric would read cd/m²",
+        );
+    }
+    Ok(if dialect.is_blender() {
+        LightUnits::Blender
+    } else {
+        LightUnits::Radiometric
+    })
 }
 
 /// Reads the light that `at` refers to, for a node that stands at `world`.
@@ -101,10 +102,9 @@ pub(super) fn read(
             seen_by_camera: extras::flag(ours, "seen_by_camera")?.unwrap_or(false),
         };
     }
-    let blender = walker.light_units == LightUnits::Blender;
     let color: [f64; 3] = light.numbers_or("color", [1.0; 3])?;
-    let mut scale =
-        light.number_or("intensity", 1.0)?.max(0.0) * units::radiometric_factor(walker.light_units);
+    let mut scale = light.number_or("intensity", 1.0)?.max(0.0)
+        * units::lamp_factor(walker.light_units, kind == "directional");
     let spot = light.get("spot");
     let angle = |key: &str, default: f64| match &spot {
         Some(s) => s.number_or(key, default),
@@ -118,9 +118,7 @@ pub(super) fn read(
         scale = 0.0;
     }
     let range = match light.get("range") {
-        // In Blender the custom distance is for its rasteriser alone; Cycles takes no heed of it.
-        Some(_) if blender => f64::INFINITY,
-        Some(r) if kind != "directional" => r.f64()?,
+        Some(r) if kind != "directional" && walker.lamps.has_ranges() => r.f64()?,
         _ => f64::INFINITY,
     };
     if !(range > 0.0) {
@@ -136,11 +134,7 @@ pub(super) fn read(
         strength: Rgb::new(color[0], color[1], color[2]).map(|c| c.max(0.0)) * scale,
         inner_cone: angle("innerConeAngle", 0.0)?.clamp(0.0, outer),
         outer_cone: outer,
-        spot_curve: if blender {
-            SpotCurve::Cycles
-        } else {
-            SpotCurve::Gltf
-        },
+        spot_curve: walker.lamps.spot_curve(),
         range,
         radius: extent.radius,
         angular_radius: 0.5 * extent.angle,

@@ -88,12 +88,6 @@ pub(super) fn read<'a>(
         slots.found.base_color = slots.read(&pbr, "baseColorTexture", base)?;
         slots.found.metallic_roughness = slots.data(&pbr, "metallicRoughnessTexture")?;
     }
-    if m.get("occlusionTexture").is_some() {
-        slots.notes.add(
-            "occlusion textures are not applied: what they bake, global illumination computes",
-            1,
-        );
-    }
     specular_glossiness(&mut out, m, base, &mut slots)?;
     surface_extensions(&mut out, m, &mut slots)?;
     layer_extensions(&mut out, m, &mut slots)?;
@@ -107,6 +101,12 @@ pub(super) fn read<'a>(
         out.textures = Some(Arc::new(slots.found));
     }
     Ok(out)
+}
+
+/// Whether a material emits, by its factor.
+pub(super) fn emits(m: &Cursor<'_>) -> bool {
+    let factor = m.numbers_or("emissiveFactor", [0.0; 3]);
+    m.extension("KHR_materials_unlit").is_none() && factor.is_ok_and(|f| f != [0.0; 3])
 }
 
 fn base_color(out: &mut MaterialDesc, owner: &Cursor<'_>, key: &str) -> Result<(), Problem> {

@@ -9,6 +9,7 @@ mod animation;
 mod buffer;
 mod camera;
 mod container;
+mod dialect;
 #[cfg(feature = "draco")]
 mod draco;
 mod environment;
@@ -56,6 +57,7 @@ use crate::lights::LightDesc;
 use crate::materials::MaterialDesc;
 use crate::scene::{Omit, Scene, SceneBuilder, ScenePlugins};
 use accessor::Source;
+use dialect::Dialect;
 pub use environment::{EnvironmentOption, EnvironmentSource};
 use hierarchy::Hierarchy;
 use image::Images;
@@ -312,22 +314,20 @@ fn fill<'a>(
     images.decode()?;
     let mut materials = Vec::new();
     let mut solid = HashMap::new();
-    let blender = light::from_blender(root);
+    let dialect = Dialect::of(root);
     let takes_solid = match options.solid_glass {
-        SolidGlass::Auto => blender,
+        SolidGlass::Auto => dialect.is_blender(),
         SolidGlass::Always => true,
         SolidGlass::Never => false,
     };
-    let light_units = light::resolve(options.light_units, root, builder)?;
+    let light_units = light::resolve(options.light_units, dialect, root, builder)?;
     let radiance = units::radiance_factor(light_units);
     let colored = material::with_vertex_colors(root)?;
     for (i, m) in entries.iter().enumerate() {
         let mut desc = material::read(m, images, notes)?;
         ignored::tell(m, root, notes)?;
         desc.vertex_colors = colored.contains(&Some(i));
-        // Backface culling, which this says of Blender's materials, is for its rasteriser alone:
-        // in Cycles surfaces emit from both sides.
-        desc.double_sided |= blender;
+        dialect.apply(&mut desc);
         desc.emission *= radiance;
         let id = builder
             .add_material(&desc)
@@ -348,6 +348,7 @@ fn fill<'a>(
         .map_err(|e| Failure::Plugin("the default material".into(), Box::new(e)))?;
     let mut walker = Walker {
         source,
+        lamps: dialect.of_lamps(options.light_units),
         light_units,
         variant,
         hierarchy: Hierarchy::new(root.clone(), &pose),

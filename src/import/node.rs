@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use super::accessor::Source;
+use super::dialect::Dialect;
 use super::hierarchy::Hierarchy;
 use super::json::Cursor;
 use super::mesh::{Part, Shaping};
@@ -24,6 +25,8 @@ use crate::scene::{MeshPlacement, SceneBuilder};
 /// Walks the node tree and fills the scene.
 pub(super) struct Walker<'a, 'b> {
     pub(super) source: &'b Source<'a>,
+    /// Whose lamps the file's are.
+    pub(super) lamps: Dialect,
     /// The units of the file's lights, resolved.
     pub(super) light_units: LightUnits,
     /// Which variant of the materials is shown, if any.

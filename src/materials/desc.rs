@@ -79,6 +79,8 @@ pub struct MaterialDesc {
     pub anisotropy: f64,
     /// `KHR_materials_anisotropy`: rotation from the tangent, counter-clockwise, in radians.
     pub anisotropy_rotation: f64,
+    /// What the strength of anisotropy means.
+    pub brushing: Brushing,
     /// `KHR_materials_iridescence`: strength.
     pub iridescence: f64,
     /// `KHR_materials_iridescence`: index of refraction of the film.
@@ -95,6 +97,31 @@ pub struct MaterialDesc {
     pub textures: Option<Arc<TextureSlots>>,
     /// The material's `extras`, for kinds of one's own.
     pub extras: Value,
+}
+
+/// What a strength of anisotropy does to the two widths of a surface of the width α, which is the
+/// square of its roughness.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Brushing {
+    /// By `KHR_materials_anisotropy`: along the tangent `mix(α, 1, strength²)`, across it α.
+    #[default]
+    Gltf,
+    /// As Cycles' Principled BSDF has it: with `a = √(1 − 0.9 strength)` α/a along the tangent, 1 at
+    /// most, and α·a across it.
+    Cycles,
+}
+
+impl Brushing {
+    /// The widths along the tangent and across it.
+    pub fn widths(self, alpha: f64, strength: f64) -> [f64; 2] {
+        match self {
+            Self::Gltf => [alpha + (1.0 - alpha) * strength * strength, alpha],
+            Self::Cycles => {
+                let aspect = (1.0 - 0.9 * strength).sqrt();
+                [(alpha / aspect).min(1.0), alpha * aspect]
+            }
+        }
+    }
 }
 
 impl Default for MaterialDesc {
@@ -124,6 +151,7 @@ impl Default for MaterialDesc {
             sheen_roughness: 0.0,
             anisotropy: 0.0,
             anisotropy_rotation: 0.0,
+            brushing: Brushing::Gltf,
             iridescence: 0.0,
             iridescence_ior: 1.3,
             iridescence_thickness: [100.0, 400.0],

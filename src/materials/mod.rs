@@ -29,7 +29,7 @@ mod pbr;
 mod unlit;
 
 pub use bsdf::{Bsdf, BsdfSample, BsdfValue, FrameId, Matte, Scattering, TransportMode};
-pub use desc::{AlphaMode, Interior, MaterialDesc, MaterialTraits, Medium};
+pub use desc::{AlphaMode, Brushing, Interior, MaterialDesc, MaterialTraits, Medium};
 pub use features::Features;
 pub use filmed::FacetFilm;
 pub use lobes::{CustomLobe, Lobe, LobeClass, LobeModel, LobeSample};

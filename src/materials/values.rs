@@ -1,6 +1,5 @@
 //! The numbers of a glTF material at one point, and the lobes they make.
 
-use super::Bsdf;
 use super::bsdf::FrameId;
 use super::cover::Cover;
 use super::dielectric::Interface;
@@ -11,6 +10,7 @@ use super::lobes::{
 };
 use super::microfacet::Ggx;
 use super::thin_film::ThinFilm;
+use super::{Brushing, Bsdf};
 use super::{Interior, MaterialDesc, MaterialTraits};
 use crate::color::Rgb;
 
@@ -38,6 +38,7 @@ pub(super) struct Values {
     pub(super) sheen_roughness: f64,
     pub(super) anisotropy: f64,
     pub(super) anisotropy_rotation: f64,
+    pub(super) brushing: Brushing,
     pub(super) iridescence: f64,
     pub(super) iridescence_ior: f64,
     pub(super) iridescence_range: [f64; 2],
@@ -65,6 +66,7 @@ impl From<&MaterialDesc> for Values {
             sheen_roughness: d.sheen_roughness,
             anisotropy: d.anisotropy,
             anisotropy_rotation: d.anisotropy_rotation,
+            brushing: d.brushing,
             iridescence: d.iridescence,
             iridescence_ior: d.iridescence_ior,
             iridescence_range: d.iridescence_thickness,
@@ -125,8 +127,8 @@ impl Values {
     /// The microfacet distribution (`KHR_materials_anisotropy` widens it along the tangent).
     fn ggx(&self) -> Ggx {
         let alpha = self.roughness.max(MaterialDesc::SMOOTH).powi(2);
-        let along = alpha + (1.0 - alpha) * self.anisotropy * self.anisotropy;
-        Ggx { x: along, y: alpha }
+        let [x, y] = self.brushing.widths(alpha, self.anisotropy);
+        Ggx { x, y }
     }
 
     /// Pushes the lobes, from the base outward, in the main frame of `bsdf`; the clear coat lies
