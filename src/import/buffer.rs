@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Deref;
 use std::path::Path;
+#[cfg(feature = "meshopt")]
 use std::sync::Arc;
 
 /// A run of bytes, in memory or in a file.
@@ -25,6 +26,7 @@ pub(super) enum Bytes<'a> {
     /// Read for this.
     Owned(Vec<u8>),
     /// So many from a place on of some that others read, too.
+    #[cfg(feature = "meshopt")]
     Shared(Arc<[u8]>, usize, usize),
 }
 
@@ -35,6 +37,7 @@ impl Deref for Bytes<'_> {
         match self {
             Self::Here(bytes) => bytes,
             Self::Owned(bytes) => bytes,
+            #[cfg(feature = "meshopt")]
             Self::Shared(bytes, at, len) => &bytes[*at..*at + *len],
         }
     }

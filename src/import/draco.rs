@@ -1,5 +1,6 @@
 //! Primitives that `KHR_draco_mesh_compression` packs.
 
+use std::panic::resume_unwind;
 use std::sync::{Mutex, PoisonError};
 
 use draco_core::{
@@ -43,6 +44,19 @@ pub(super) fn total(root: &Cursor<'_>) -> usize {
         .fold(0, usize::saturating_add)
 }
 
+/// Does work in a thread of its own. Allocators keep what a thread frees for that thread: so the next
+/// decoder gets what this one had, and not every thread of the pool keeps as much.
+fn apart<T: Send>(
+    at: &Cursor<'_>,
+    work: impl FnOnce() -> Result<T, Problem> + Send,
+) -> Result<T, Problem> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().spawn_scoped(scope, work);
+        let thread = thread.map_err(|e| at.problem(format!("gets no thread ({e})")))?;
+        thread.join().unwrap_or_else(|panic| resume_unwind(panic))
+    })
+}
+
 /// Bytes of a primitive: 12 for each vertex in each attribute, more or less, and its indices.
 fn size(e: &Cursor<'_>, vertices: usize, indices: usize) -> usize {
     let ids = e.get("attributes");
@@ -76,7 +90,7 @@ impl<'a> Draco<'a> {
             .with_max_decoded_bytes((bytes as u64).saturating_mul(2).saturating_add(1 << 20));
         let packed = source.views.get(&e.need("bufferView")?)?;
         let size = size(e, vertices, indices);
-        let mesh = source.gate.pass(size.saturating_mul(EFFORT), size, || {
+        let decode = || {
             let packed = packed.read(0, packed.len)?;
             let mut mesh = Mesh::new();
             MeshDecoder::new()
@@ -86,7 +100,9 @@ impl<'a> Draco<'a> {
                 )
                 .map_err(|error| e.problem(format!("cannot be decoded ({error})")))?;
             Ok::<_, Problem>(mesh)
-        })?;
+        };
+        let need = size.saturating_mul(EFFORT);
+        let mesh = source.gate.pass(need, size, || apart(e, decode))?;
         if mesh.num_points() != vertices {
             return Err(e.problem(format!(
                 "holds {} vertices, the accessors say {vertices}",
