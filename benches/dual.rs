@@ -1,25 +1,31 @@
 //! Our dual numbers against the library `num-dual` on the kernels that use them, and against the
-//! plain scalar: nanoseconds each, side by side; the ratios within one run count.
+//! plain scalar; and what a forecast costs beside the hit that it starts from and the rays that it
+//! saves: nanoseconds each, side by side; the ratios within one run count.
 //!
-//! Run with `cargo bench --bench dual`; a number as argument sets the repeats (9).
+//! Run with `cargo bench --bench dual`; a number as argument sets the repeats (201).
 
 #![allow(
     clippy::unwrap_used,
     reason = "a benchmark may stop at the first surprise"
 )]
 
+use std::f64::consts::PI;
 use std::hint::black_box;
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
-use dualight::accel::ACCELERATORS;
+use dualight::accel::{ACCELERATORS, Accelerator};
 use dualight::ad::{Dual, Real, V3};
-use dualight::geometry::forecast::{
-    Moves, Order, SphereForecast, TriangleForecast, edge_functions,
+use dualight::geometry::forecast::{Moves, Order, SphereForecast, edge_functions};
+use dualight::geometry::{
+    Geometry, Hit, MaterialId, Object, Ray, ScenePatches, Shape, ShapeId, TriangleMesh, Walk,
 };
-use dualight::geometry::{Geometry, MaterialId, Object, Ray, Shape, ShapeId, SphereSet};
 use dualight::geometry::{sphere::line_sphere, triangle::plane_hit};
-use dualight::math::DVec3;
-use dualight::sampling::Rng;
+use dualight::import::{self, ImportOptions};
+use dualight::math::{DVec3, Frame};
+use dualight::sampling::{Rng, warp};
+use dualight::scene::ScenePlugins;
 
 #[path = "../tests/common/oracle.rs"]
 #[allow(dead_code, unreachable_pub, reason = "shared with the tests")]
@@ -32,7 +38,7 @@ type Input = (DVec3, DVec3);
 const N: usize = 4096;
 
 /// Median nanoseconds per input, each contestant once per round.
-fn race(repeats: usize, inputs: &[Input], fs: &[(&str, &dyn Fn(&Input) -> f64)]) -> Vec<f64> {
+fn race<T>(repeats: usize, inputs: &[T], fs: &[(&str, &dyn Fn(&T) -> f64)]) -> Vec<f64> {
     let mut times = vec![Vec::new(); fs.len()];
     for _ in 0..repeats {
         for (k, (_, f)) in fs.iter().enumerate() {
@@ -64,8 +70,8 @@ fn checked_sum(c: Checked) -> f64 {
     c.gradient().map_or(0.0, |g| g.iter().sum())
 }
 
-fn sphere<R: Real>(d: V3<R>, o: DVec3, sum: impl Fn(R) -> f64) -> f64 {
-    let line = line_sphere(V3::constant(o), d, DVec3::ZERO, 1.0);
+fn sphere<R: Real>(d: V3<R>, o: DVec3, c: DVec3, r: f64, sum: impl Fn(R) -> f64) -> f64 {
+    let line = line_sphere(V3::constant(o), d, c, r);
     let t = line.roots().map_or(0.0, |t| sum(t[0]));
     sum(line.discriminant) + t
 }
@@ -89,20 +95,25 @@ fn main() {
         .collect();
     let v = [DVec3::new(-1.0, -1.0, 0.1), DVec3::X, DVec3::Y];
 
+    let c = DVec3::ZERO;
     println!("sphere: discriminant and near root with three derivatives");
     let s = race(
         repeats,
         &inputs,
         &[
-            ("f64", &|i| sphere(V3::<f64>::constant(i.1), i.0, |r| r)),
+            ("f64", &|i| {
+                sphere(V3::<f64>::constant(i.1), i.0, c, 1.0, |r| r)
+            }),
             ("ad::Dual<f64, 3>", &|i| {
-                sphere(V3::variable(i.1), i.0, gradient_sum)
+                sphere(V3::variable(i.1), i.0, c, 1.0, gradient_sum)
             }),
             ("num_dual::DualSVec64<3>", &|i| {
-                sphere(Oracle::inputs(i.1), i.0, |r| r.gradient().iter().sum())
+                sphere(Oracle::inputs(i.1), i.0, c, 1.0, |r| {
+                    r.gradient().iter().sum()
+                })
             }),
             ("the same with an invalid state", &|i| {
-                sphere(Checked::inputs(i.1), i.0, checked_sum)
+                sphere(Checked::inputs(i.1), i.0, c, 1.0, checked_sum)
             }),
         ],
     );
@@ -131,11 +142,47 @@ fn main() {
         t[3] / t[1]
     );
 
-    println!("a check of four corners: forecast against tracing");
+    for (name, geometry, from) in [
+        ("scenes/box.gltf", box_scene(), DVec3::new(0.1, 0.9, 0.05)),
+        (
+            "a ball of 100,000 triangles",
+            ball(),
+            DVec3::new(0.4, 2.5, 0.3),
+        ),
+    ] {
+        let rays = checks(&geometry, from, &mut rng);
+        costs(repeats, name, &geometry, &rays);
+    }
+}
+
+/// The box of the repository.
+fn box_scene() -> Arc<Geometry> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box.gltf");
+    let scene = import::load(&path, &ImportOptions::default(), ScenePlugins::default()).unwrap();
+    Arc::clone(&scene.geometry)
+}
+
+/// A smooth ball of radius 1.
+fn ball() -> Arc<Geometry> {
+    let (rings, sectors) = (200u32, 250u32);
+    let mut mesh = TriangleMesh::default();
+    for j in 0..=rings {
+        for i in 0..=sectors {
+            let theta = f64::from(j) / f64::from(rings) * PI;
+            let phi = f64::from(i % sectors) / f64::from(sectors) * 2.0 * PI;
+            let ring = if j % rings == 0 { 0.0 } else { theta.sin() };
+            let n = DVec3::new(ring * phi.cos(), theta.cos(), -ring * phi.sin());
+            mesh.positions.push(n.as_vec3().into());
+            mesh.normals.push(n.as_vec3().into());
+        }
+    }
+    let w = sectors + 1;
+    for a in (0..rings).flat_map(|j| (0..sectors).map(move |i| j * w + i)) {
+        mesh.indices.push([a, a + w + 1, a + 1]);
+        mesh.indices.push([a, a + w, a + w + 1]);
+    }
     let mut g = Geometry::default();
-    g.shapes.push(Shape::Spheres(SphereSet {
-        spheres: vec![[0.0, 0.0, 0.0, 1.0]],
-    }));
+    g.shapes.push(Shape::Mesh(mesh));
     g.objects.push(Object {
         shape: ShapeId(0),
         placement: None,
@@ -144,46 +191,155 @@ fn main() {
         name: "ball".into(),
         coverage: None,
     });
-    let accel = (ACCELERATORS[0].build)(&std::sync::Arc::new(g), 1).unwrap();
-    let corners =
-        [(0.1, 0.1), (-0.1, 0.1), (0.1, -0.1), (-0.1, -0.1)].map(|(x, y)| DVec3::new(x, y, 0.0));
-    race(
-        repeats,
-        &inputs,
-        &[
-            ("closest-hit call of the backend", &|i| {
-                let hit = accel.intersect(&Ray::new(i.0, i.1));
-                hit.map_or(0.0, |h| f64::from(h.t))
-            }),
-            ("sphere: dual forecast, 4 corners", &|i| {
-                let f = SphereForecast::new(i.0, i.1, DVec3::ZERO, 1.0, Moves::Target).unwrap();
-                corners.iter().map(|&h| f.at(h, Order::Quadratic)).sum()
-            }),
-            ("sphere: anew at 4 corners", &|i| {
-                let at = |h: DVec3| {
-                    let d = V3::<f64>::constant(i.1 + h);
-                    line_sphere(V3::constant(i.0), d, DVec3::ZERO, 1.0).discriminant
-                };
-                corners.iter().map(|&h| at(h)).sum()
-            }),
-            ("triangle: dual forecast, 4 corners", &|i| {
-                let f = TriangleForecast::new(i.0, i.1, v, Moves::Target).unwrap();
-                corners.iter().map(|&h| f.at(h).iter().sum::<f64>()).sum()
-            }),
-            ("triangle: anew at 4 corners", &|i| {
-                let at = |h: DVec3| {
-                    let d = V3::<f64>::constant(i.1 + h);
-                    edge_functions(V3::constant(i.0), d, v).iter().sum::<f64>()
-                };
-                corners.iter().map(|&h| at(h)).sum()
-            }),
-            ("4 rays traced", &|i| {
-                let at = |h: DVec3| accel.intersect(&Ray::new(i.0, i.1 + h));
-                corners
-                    .iter()
-                    .map(|&h| at(h).map_or(0.0, |h| f64::from(h.t)))
-                    .sum()
-            }),
-        ],
-    );
+    Arc::new(g)
+}
+
+/// A check ray that has hit a triangle, and where the corners of its cell lie.
+struct Check {
+    ray: Ray,
+    hit: Hit,
+    /// Corners of the triangle.
+    v: [DVec3; 3],
+    corners: [DVec3; 4],
+}
+
+/// Half width of a cell, over the distance of where its rays are aimed: the first cells of a lamp
+/// are about twice as wide, the last much narrower.
+const REACH: f64 = 0.05;
+
+/// Rays from a point to anywhere in the unit ball, as far as they hit triangles.
+fn checks(geometry: &Arc<Geometry>, from: DVec3, rng: &mut Rng) -> Vec<Check> {
+    let accel = (ACCELERATORS[0].build)(geometry, 1).unwrap();
+    let mut out = Vec::new();
+    while out.len() < N {
+        let to = warp::sphere(rng.next_2d()) * rng.next_1d().cbrt();
+        let ray = Ray::new(from, to - from);
+        let Some(hit) = accel.intersect(&ray) else {
+            continue;
+        };
+        let object = geometry.object(hit.object);
+        let (Shape::Mesh(mesh), None) = (geometry.shape(object.shape), &object.placement) else {
+            continue;
+        };
+        let frame = Frame::from_normal(ray.direction().normalize());
+        let side = REACH * ray.direction().length();
+        let corner = |x: f64, y: f64| frame.x * (x * side) + frame.y * (y * side);
+        out.push(Check {
+            ray,
+            hit,
+            v: mesh.corners(hit.prim),
+            corners: [
+                corner(1.0, 1.0),
+                corner(-1.0, 1.0),
+                corner(1.0, -1.0),
+                corner(-1.0, -1.0),
+            ],
+        });
+    }
+    out
+}
+
+/// What a forecast costs, beside the hit that it starts from and the rays that it saves.
+fn costs(repeats: usize, name: &str, geometry: &Arc<Geometry>, checks: &[Check]) {
+    let built: Vec<(String, Box<dyn Accelerator>)> = ACCELERATORS
+        .iter()
+        .filter(|e| e.name != "linear")
+        .map(|e| (e.name.into(), (e.build)(geometry, 1).unwrap()))
+        .collect();
+    let patches = ScenePatches::new(geometry);
+    let closest = |accel: &dyn Accelerator, ray: &Ray| {
+        let hit = accel.intersect(ray);
+        hit.map_or(0.0, |h| f64::from(h.t))
+    };
+    // A sphere beside the way of most rays, as most that a cell is asked about are.
+    let (c, r) = (DVec3::new(0.2, -0.3, 0.1), 0.3);
+    let calls: Vec<(String, Box<dyn Fn(&Check) -> f64 + '_>)> = built
+        .iter()
+        .map(
+            |(name, accel)| -> (String, Box<dyn Fn(&Check) -> f64 + '_>) {
+                (
+                    format!("closest-hit call of {name}"),
+                    Box::new(|i: &Check| closest(&**accel, &i.ray)),
+                )
+            },
+        )
+        .collect();
+    let first = &*built[0].1;
+    let own: [(&str, &dyn Fn(&Check) -> f64); 10] = [
+        ("surface point of that hit", &|i| {
+            geometry.surface_point(&i.ray, &i.hit).distance
+        }),
+        ("sphere: hit", &|i| {
+            sphere(
+                V3::<f64>::constant(i.ray.direction()),
+                i.ray.origin(),
+                c,
+                r,
+                |x| x,
+            )
+        }),
+        ("sphere: dual hit", &|i| {
+            sphere(
+                V3::variable(i.ray.direction()),
+                i.ray.origin(),
+                c,
+                r,
+                gradient_sum,
+            )
+        }),
+        ("sphere: forecast, both sides", &|i| {
+            let (o, d) = (i.ray.origin(), i.ray.direction());
+            let f = SphereForecast::new(o, d, c, r, Moves::Target).unwrap();
+            f.at(i.corners[0], Order::Quadratic) + f.at(i.corners[3], Order::Quadratic)
+        }),
+        ("triangle: hit", &|i| {
+            triangle(
+                V3::<f64>::constant(i.ray.direction()),
+                i.ray.origin(),
+                i.v,
+                |x| x,
+            )
+        }),
+        ("triangle: dual hit", &|i| {
+            triangle(
+                V3::variable(i.ray.direction()),
+                i.ray.origin(),
+                i.v,
+                gradient_sum,
+            )
+        }),
+        ("triangle: edges at 4 corners", &|i| {
+            let at = |h: DVec3| {
+                let d = V3::<f64>::constant(i.ray.direction() + h);
+                edge_functions(V3::constant(i.ray.origin()), d, i.v)
+            };
+            i.corners.iter().map(|&h| at(h).iter().sum::<f64>()).sum()
+        }),
+        ("the same by value and gradient", &|i| {
+            let (o, d) = (i.ray.origin(), i.ray.direction());
+            let e: [Dual<f64, 3>; 3] = edge_functions(V3::constant(o), V3::variable(d), i.v);
+            let e = e.map(|e| (e.value(), DVec3::from_array(e.gradient().unwrap())));
+            let at = |h: DVec3| e.iter().map(|e| e.0 + e.1.dot(h)).sum::<f64>();
+            i.corners.iter().map(|&h| at(h)).sum()
+        }),
+        ("mesh: forecast, 4 corners", &|i| {
+            let (o, d) = (i.ray.origin(), i.ray.direction());
+            let mesh = patches.mesh(geometry, &i.hit).unwrap();
+            let stops = |h: DVec3| {
+                let walk = mesh.walk(i.hit.prim, [o, d, h], Moves::Target);
+                matches!(walk, Walk::Stopped(..))
+            };
+            f64::from(u8::from(i.corners.iter().any(|&h| stops(h))))
+        }),
+        ("4 closest-hit calls at the corners", &|i| {
+            let (o, d) = (i.ray.origin(), i.ray.direction());
+            let at = |h: DVec3| closest(first, &Ray::new(o, d + h));
+            i.corners.iter().map(|&h| at(h)).sum()
+        }),
+    ];
+    let all: Vec<(&str, &dyn Fn(&Check) -> f64)> = (calls.iter().map(|(n, f)| (&n[..], &**f)))
+        .chain(own)
+        .collect();
+    println!("{name}: check rays and what their hits forecast");
+    race(repeats, checks, &all);
 }
