@@ -70,12 +70,15 @@ fn checked_sum(c: Checked) -> f64 {
     c.gradient().map_or(0.0, |g| g.iter().sum())
 }
 
+// Inlined as the renderer has them.
+#[inline(always)]
 fn sphere<R: Real>(d: V3<R>, o: DVec3, c: DVec3, r: f64, sum: impl Fn(R) -> f64) -> f64 {
     let line = line_sphere(V3::constant(o), d, c, r);
     let t = line.roots().map_or(0.0, |t| sum(t[0]));
     sum(line.discriminant) + t
 }
 
+#[inline(always)]
 fn triangle<R: Real>(d: V3<R>, o: DVec3, v: [DVec3; 3], sum: impl Fn(R) -> f64) -> f64 {
     let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
     let hit = plane_hit(V3::constant(o), d, v[0], e1, e2, e1.cross(e2));

@@ -33,15 +33,6 @@ pub enum Order {
     Quadratic,
 }
 
-/// The ray with its inputs marked as such: three derivatives, by the coordinates of what moves.
-#[inline]
-fn inputs(o: DVec3, d: DVec3, moves: Moves) -> (V3<Dual<f64, 3>>, V3<Dual<f64, 3>>) {
-    match moves {
-        Moves::Target => (V3::constant(o), V3::variable(d)),
-        Moves::Ray => (V3::variable(o), V3::constant(d)),
-    }
-}
-
 /// The discriminant of a ray and a sphere, and how it changes.
 #[derive(Clone, Copy, Debug)]
 pub struct SphereForecast {
@@ -63,10 +54,14 @@ impl SphereForecast {
     /// much. `None` if nothing can be said (an overflow).
     #[inline]
     pub fn new(o: DVec3, d: DVec3, center: DVec3, r: f64, moves: Moves) -> Option<Self> {
-        let (od, dd) = inputs(o, d, moves);
-        let line = line_sphere(od, dd, center, r);
-        let discriminant = line.discriminant.value();
-        let mut gradient = DVec3::from_array(line.discriminant.gradient()?);
+        // Three derivatives, by the coordinates of what moves. Each way on its own, so that the
+        // compiler knows of every number whether it varies.
+        let dual: Dual<f64, 3> = match moves {
+            Moves::Target => line_sphere(V3::constant(o), V3::variable(d), center, r).discriminant,
+            Moves::Ray => line_sphere(V3::variable(o), V3::constant(d), center, r).discriminant,
+        };
+        let discriminant = dual.value();
+        let mut gradient = DVec3::from_array(dual.gradient()?);
         let inv_dd = 1.0 / d.dot(d);
         if moves == Moves::Target {
             // The polynomial is D times |d|², which changes with the target too.
@@ -113,46 +108,11 @@ impl SphereForecast {
 /// back. The function of a shared edge differs in sign only, to the last bit.
 ///
 /// They are left un-normalised: barycentric coordinates have a pole at grazing incidence, these
-/// are polynomials.
-#[inline]
+/// are polynomials. They are linear in what moves, so that value and gradient at a ray add up to
+/// the value at a check point. Where a single check point is asked about, that is computed for
+/// less at the point itself, and its sign does not depend on which of two triangles asks.
+#[inline(always)]
 pub fn edge_functions<R: Real>(o: V3<R>, d: V3<R>, v: [DVec3; 3]) -> [R; 3] {
     let r = v.map(|p| V3::constant(p) - o);
     [0, 1, 2].map(|i| d.dot(r[i].cross(r[(i + 1) % 3])))
-}
-
-/// The edge functions of a ray and a triangle, and how they change.
-#[derive(Clone, Copy, Debug)]
-pub struct TriangleForecast {
-    /// At the ray itself.
-    pub edges: [f64; 3],
-    /// Their gradients by the check point.
-    pub gradients: [DVec3; 3],
-}
-
-impl TriangleForecast {
-    /// The forecast for the ray from `o` along `d` and the triangle `v`. `None` if nothing can be
-    /// said (an overflow).
-    #[inline]
-    pub fn new(o: DVec3, d: DVec3, v: [DVec3; 3], moves: Moves) -> Option<Self> {
-        let (o, d) = inputs(o, d, moves);
-        let e = edge_functions(o, d, v);
-        let gradient = |i: usize| e[i].gradient().map(DVec3::from_array);
-        Some(Self {
-            edges: e.map(|e| e.value()),
-            gradients: [gradient(0)?, gradient(1)?, gradient(2)?],
-        })
-    }
-
-    /// The edge functions forecast at `h`: exact, since they are linear.
-    #[inline]
-    pub fn at(&self, h: DVec3) -> [f64; 3] {
-        std::array::from_fn(|i| self.edges[i] + self.gradients[i].dot(h))
-    }
-
-    /// Whether the line at `h` is forecast to pass inside; edges count as inside.
-    #[inline]
-    pub fn meets(&self, h: DVec3) -> bool {
-        let e = self.at(h);
-        e.iter().all(|&x| x >= 0.0) || e.iter().all(|&x| x <= 0.0)
-    }
 }

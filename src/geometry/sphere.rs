@@ -29,7 +29,9 @@ pub struct LineSphere<R> {
 }
 
 /// Relates the line `o + t·d` to the sphere around `center` of radius `r`. `d` must not be zero.
-#[inline]
+///
+/// Inlined by force: dual numbers are cheap only where the compiler sees which of them are constants.
+#[inline(always)]
 pub fn line_sphere<R: Real>(o: V3<R>, d: V3<R>, center: DVec3, r: f64) -> LineSphere<R> {
     let f = o - V3::constant(center);
     let dd = d.dot(d);
@@ -58,7 +60,7 @@ pub fn line_sphere<R: Real>(o: V3<R>, d: V3<R>, center: DVec3, r: f64) -> LineSp
 
 impl<R: Real> LineSphere<R> {
     /// Both intersections in ascending order, or `None` if the line misses.
-    #[inline]
+    #[inline(always)]
     pub fn roots(&self) -> Option<[R; 2]> {
         if !(self.discriminant.re() >= 0.0) {
             return None;

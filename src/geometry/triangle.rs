@@ -23,7 +23,8 @@ pub struct PlaneHit<R> {
 ///
 /// Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, JGT 2(1), 1997, with
 /// the triple products arranged around the normal, which the caller needs anyway.
-#[inline]
+/// Inlined by force, as [`line_sphere`](super::sphere::line_sphere).
+#[inline(always)]
 pub fn plane_hit<R: Real>(
     o: V3<R>,
     d: V3<R>,
