@@ -48,6 +48,9 @@ fn every_stage_is_measured_on_every_backend_and_thread_count() {
                 found.unwrap_or_else(|| panic!("{scene} {threads} {backend} {metric}"))
             };
             assert!(of("", "import").median > 0.0);
+            for metric in ["density lookups", "irradiance lookups"] {
+                assert!(of("", metric).median > 1e3, "{:?}", of("", metric));
+            }
             for backend in backends {
                 for metric in [
                     "build",
@@ -68,12 +71,43 @@ fn every_stage_is_measured_on_every_backend_and_thread_count() {
                     assert!(m.low <= m.median && m.median <= m.high, "{m:?}");
                     assert!(m.median > 0.0, "{m:?}");
                 }
+                if cfg!(target_os = "linux") {
+                    assert!(of(backend, "beyond both/primitive").median >= 0.0);
+                }
             }
         }
     }
     for part in ["closest bounced", "scaling", "forest:4k x2"] {
         assert!(said.contains(part), "{part}");
     }
+}
+
+#[test]
+fn scaling_measures_threads_on_the_smallest_terrain_and_sizes_on_the_most_threads() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = bench(
+        directory.path(),
+        "--scaling=4k,500 --accel bvh --threads 1,2",
+    );
+    let said = text(&out.stdout);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let record = Record::parse(&said).unwrap();
+    let mut columns: Vec<(String, usize)> = Vec::new();
+    for m in &record.results {
+        let column = (m.scene.clone(), m.threads);
+        if !columns.contains(&column) {
+            columns.push(column);
+        }
+    }
+    let expected = [("terrain:500", 1), ("terrain:500", 2), ("terrain:4k", 2)];
+    assert_eq!(columns, expected.map(|(s, t)| (s.to_string(), t)));
+    // Two threads beside one, with the gain.
+    let table = said.split("scaling").nth(1).unwrap();
+    let row = table.lines().find(|l| l.contains("photons bvh")).unwrap();
+    assert_eq!(row.matches(" x").count(), 1, "{row}");
+    let few = bench(directory.path(), "--scaling=5");
+    assert_eq!(few.status.code(), Some(2));
+    assert!(text(&few.stderr).contains("at least 100"), "{few:?}");
 }
 
 #[test]
@@ -109,6 +143,19 @@ fn a_baseline_that_was_better_is_told_and_ends_with_status_1() {
         "{}",
         text(&worse.stderr)
     );
+
+    // What it does not have is named, and the rest is judged.
+    let mut less = Record::parse(&said).unwrap();
+    less.results.retain(|m| m.metric != "photon maps");
+    fs::write(d.join("less.txt"), less.line()).unwrap();
+    let partly = bench(
+        d,
+        &format!("{options} --baseline less.txt --tolerance 10000%"),
+    );
+    assert_eq!(partly.status.code(), Some(0));
+    let told = text(&partly.stderr);
+    let part = "does not have, so nothing is said of: photon maps bvh of spheres:500 on 1 threads";
+    assert!(told.contains(part), "{told}");
 
     // A baseline that says nothing is no baseline that was met.
     for options in [

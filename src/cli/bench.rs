@@ -26,12 +26,16 @@ pub(super) fn run(args: &BenchArgs) -> Result<Ending> {
     let baseline = args.baseline.as_deref().map(read_baseline).transpose()?;
     let control = Arc::new(Control::new(progress::reporter(args.quiet), None));
     signal::install(&control, args.quiet);
+    let all = pipeline::in_pool(None, rayon::current_num_threads)?;
     let threads = match args.threads.as_slice() {
-        [] => vec![pipeline::in_pool(None, rayon::current_num_threads)?],
+        [] => vec![all],
         list => list.iter().map(|n| *n as usize).collect(),
     };
+    let scaling = scaling(args.scaling.as_deref(), &args.threads, all)?;
     let subjects = (args.files.iter().map(|f| Subject::File(f)))
-        .chain(args.synthetic.iter().map(Subject::Made));
+        .chain(args.synthetic.iter().map(Subject::Made))
+        .map(|subject| (subject, &threads))
+        .chain(scaling.iter().map(|(s, t)| (Subject::Made(s), t)));
     let mut record = Record {
         schema: bench::SCHEMA.into(),
         seed: args.seed,
@@ -41,9 +45,9 @@ pub(super) fn run(args: &BenchArgs) -> Result<Ending> {
         processor: machine::processor().unwrap_or_default(),
         results: Vec::new(),
     };
-    for subject in subjects {
+    for (subject, threads) in subjects {
         let scene = Prepared::new(&subject)?;
-        for &threads in &threads {
+        for &threads in threads {
             let options = BenchOptions {
                 backends: backends.clone(),
                 rays: args.rays as usize,
@@ -79,6 +83,36 @@ pub(super) fn run(args: &BenchArgs) -> Result<Ending> {
     })
 }
 
+/// What `--scaling` adds: a terrain of each size on the most threads, the smallest of them on 1, 2, 4,
+/// … threads up to those.
+fn scaling(
+    sizes: Option<&[u64]>,
+    threads: &[u32],
+    all: usize,
+) -> Result<Vec<(Synthetic, Vec<usize>)>> {
+    let Some(sizes) = sizes else {
+        return Ok(Vec::new());
+    };
+    let steps: Vec<usize> = match threads {
+        [] => (0..usize::BITS)
+            .map(|k| 1 << k)
+            .take_while(|n| *n < all)
+            .chain([all])
+            .collect(),
+        list => list.iter().map(|n| *n as usize).collect(),
+    };
+    let most = steps.iter().copied().max().unwrap_or(all);
+    let mut sizes = sizes.to_vec();
+    sizes.sort_unstable();
+    sizes.dedup();
+    let terrain = |(i, size): (usize, &u64)| {
+        let scene = Synthetic::parse(&format!("terrain:{size}"), |_| Ok(*size));
+        let scene = scene.map_err(|e| Error::Usage(format!("--scaling {size}: {e}")))?;
+        Ok((scene, if i == 0 { steps.clone() } else { vec![most] }))
+    };
+    sizes.iter().enumerate().map(terrain).collect()
+}
+
 /// The backends that were named, or all that are fast.
 fn backends(args: &BenchArgs, registry: &Registry) -> Result<Vec<String>> {
     if args.accel.is_empty() {
@@ -106,6 +140,13 @@ fn judge(now: &Record, before: &Record, tolerance: f64) -> Result<Ending> {
             "the baseline has nothing to compare with; measure the same scenes, backends and \
              threads, both times with --repeats 3 or more"
                 .into(),
+        ));
+    }
+    let unknown = now.unknown_to(before);
+    if !unknown.is_empty() {
+        console::say(format_args!(
+            "warning: the baseline does not have, so nothing is said of: {}",
+            unknown.join(", ")
         ));
     }
     if (&now.processor, &now.isa) != (&before.processor, &before.isa) {

@@ -72,7 +72,7 @@ pub struct AccuracyArgs {
 #[derive(Clone, Debug, Args)]
 pub struct BenchArgs {
     /// glTF scenes (.glb or .gltf)
-    #[arg(value_name = "SCENE", required_unless_present = "synthetic")]
+    #[arg(value_name = "SCENE", required_unless_present_any = ["synthetic", "scaling"])]
     pub files: Vec<PathBuf>,
     /// Made-up scene: terrain, forest, spheres or soup, with a number of primitives. May be given
     /// several times
@@ -93,10 +93,17 @@ pub struct BenchArgs {
     /// Numbers of threads; several show how all scales [default: one per processor]
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = values::positive_u32)]
     pub threads: Vec<u32>,
+    /// How all scales: terrains of these sizes on all threads (or the most of --threads), the
+    /// smallest also on 1, 2, 4, … threads (or those of --threads)
+    #[arg(long, value_name = "N,N", num_args = 0..=1, require_equals = true, value_delimiter = ',')]
+    #[arg(default_missing_values = ["1M", "5M", "20M"], value_parser = values::count)]
+    pub scaling: Option<Vec<u64>>,
     /// Seed of rays and photons
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Earlier output of this command to compare with; status 1 if something became worse
+    /// Earlier output of this command to compare with. Status 1 if a median became worse by more
+    /// than the tolerance and the ranges of all repeats do not meet; times need three repeats on
+    /// both sides; what the baseline does not have is named and not judged
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
     /// How much worse something may become

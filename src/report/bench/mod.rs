@@ -4,6 +4,7 @@
 //! ratios within a run count, absolute numbers depend on the machine and on its load.
 
 mod glb;
+mod lookups;
 mod rays;
 mod record;
 mod synthetic;
@@ -15,6 +16,7 @@ pub use synthetic::{KINDS, Synthetic};
 use std::path::Path;
 use std::time::Instant;
 
+use lookups::{Lookups, Question};
 use record::Collector;
 
 use crate::accel::Accelerator;
@@ -48,6 +50,13 @@ const SECONDS: (&str, bool) = ("s", false);
 const RATE: (&str, bool) = ("/s", true);
 const BYTES: (&str, bool) = ("B", false);
 
+/// Memory once all is built, by the operating system, without the file's size and what the backend
+/// says it holds itself (Embree by its memory monitor).
+const BEYOND: &str = "beyond both/primitive";
+
+/// Where [`Order::Bounced`] stands among all.
+const BOUNCED: usize = 1;
+
 /// Measures one scene on a number of threads; `None` if stopped. Also the versions of the
 /// backends.
 ///
@@ -73,7 +82,7 @@ fn measure(
     registry: &Registry,
     control: &Control,
 ) -> Result<Option<(Vec<Metric>, Vec<String>)>> {
-    let steps = 3 + 3 * (options.repeats * options.backends.len()) as u64;
+    let steps = 4 + 3 * (options.repeats * options.backends.len()) as u64;
     let stage = control.stage("bench", "steps", steps);
     let silent = control.silent();
     let mut out = Collector {
@@ -82,7 +91,8 @@ fn measure(
         results: Vec::new(),
     };
     reset_peak_memory();
-    let before = peak_memory();
+    let start = peak_memory();
+    let file_bytes = std::fs::metadata(file).map_or(0, |m| m.len());
     let (scene, seconds) = import(file, import_options, options, registry)?;
     stage.advance(1);
     out.add("", "import", SECONDS, &seconds);
@@ -91,11 +101,10 @@ fn measure(
         let census = Census::new(&scene);
         (census.triangles + census.spheres).max(1) as f64
     };
-    if let (Some(a), Some(b)) = (before, peak_memory()) {
-        let file_bytes = std::fs::metadata(file).map_or(0, |m| m.len()) as f64;
+    if let (Some(a), Some(b)) = (start, peak_memory()) {
         let peak = b.saturating_sub(a) as f64;
         out.add("", "import peak/primitive", BYTES, &[peak / primitives]);
-        let beyond = (peak - file_bytes).max(0.0);
+        let beyond = (peak - file_bytes as f64).max(0.0);
         out.add("", "beyond file/primitive", BYTES, &[beyond / primitives]);
     }
 
@@ -115,6 +124,14 @@ fn measure(
         if let (Some(a), Some(b)) = (before, peak_memory()) {
             let peak = b.saturating_sub(a) as f64;
             out.add(backend, "build peak/primitive", BYTES, &[peak / primitives]);
+        }
+        // What the process holds now, the scene with it, but for what the file and the backend's own
+        // structure explain. A peak that begins anew is what is resident.
+        reset_peak_memory();
+        if let (Some(a), Some(b)) = (start, peak_memory()) {
+            let explained = file_bytes + stats.bytes;
+            let beyond = b.saturating_sub(a).saturating_sub(explained) as f64;
+            out.add(backend, BEYOND, BYTES, &[beyond / primitives]);
         }
         versions.push(stats.backend);
     }
@@ -165,6 +182,16 @@ fn measure(
             rays::rays(order, options.rays, options.seed, &scene, &*camera, &**a)
         })
     });
+    stage.advance(1);
+    if let Some(judge) = judge {
+        let lookups = Lookups::new(&scene, &**judge, &sets[BOUNCED], options, registry, &silent)?;
+        for question in Question::ALL {
+            let rates: Vec<f64> = (0..options.repeats)
+                .filter_map(|_| lookups.rate(question))
+                .collect();
+            out.add("", question.metric(), RATE, &rates);
+        }
+    }
     stage.advance(1);
     let mut rates = vec![vec![[Vec::new(), Vec::new()]; sets.len()]; accels.len()];
     for _ in 0..options.repeats {

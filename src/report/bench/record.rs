@@ -146,6 +146,25 @@ impl Record {
         (found, shared)
     }
 
+    /// What was measured and cannot be judged, since the baseline has no such quantity: in a few
+    /// words, whole scenes by their names alone.
+    pub fn unknown_to(&self, baseline: &Self) -> Vec<String> {
+        let known = |m: &Metric| baseline.results.iter().any(|b| b.key() == m.key());
+        let mut out: Vec<String> = Vec::new();
+        for m in self.results.iter().filter(|m| !known(m)) {
+            let group = |o: &&Metric| (&o.scene, o.threads) == (&m.scene, m.threads);
+            let scene = format!("{} on {} threads", m.scene, m.threads);
+            let name = match self.results.iter().filter(group).any(known) {
+                true => format!("{} {} of {scene}", m.metric, m.backend).replace("  ", " "),
+                false => format!("all of {scene}"),
+            };
+            if !out.contains(&name) {
+                out.push(name);
+            }
+        }
+        out
+    }
+
     /// The line that programs read.
     pub fn line(&self) -> String {
         // Numbers and text always become JSON.
@@ -217,7 +236,8 @@ impl Record {
     }
 
     /// How the metrics change with threads and with the size of the scene: a row per metric and
-    /// backend, a column per scene and thread count; empty if there is but one.
+    /// backend, a column per scene and thread count; empty if there is but one. Beside a value, how
+    /// many times better it is than the same scene's on the fewest threads.
     pub fn scaling(&self) -> String {
         let mut columns: Vec<(&str, usize)> = Vec::new();
         let mut rows: Vec<(&str, &str)> = Vec::new();
@@ -249,13 +269,30 @@ impl Record {
                     .results
                     .iter()
                     .find(|m| m.key() == (c.0, c.1, row.1, row.0));
-                let text =
-                    found.map_or(String::new(), |m| format!("{} {}", short(m.median), m.unit));
+                let text = found.map_or(String::new(), |m| {
+                    let mut text = format!("{} {}", short(m.median), m.unit);
+                    if let Some(gain) = self.gain(m) {
+                        text += &format!(" x{gain:.2}");
+                    }
+                    text
+                });
                 let _ = write!(out, " {text:>18}");
             }
             out.push('\n');
         }
         out
+    }
+}
+
+impl Record {
+    /// How many times better a metric is than on the fewest threads; `None` there, and where memory
+    /// is measured.
+    fn gain(&self, m: &Metric) -> Option<f64> {
+        let same =
+            |o: &&Metric| (&o.scene, &o.backend, &o.metric) == (&m.scene, &m.backend, &m.metric);
+        let fewest = self.results.iter().filter(same).min_by_key(|o| o.threads)?;
+        let comparable = matches!(m.unit.as_str(), "s" | "/s") && fewest.threads < m.threads;
+        comparable.then(|| 1.0 / m.worse(fewest))
     }
 }
 
@@ -320,6 +357,70 @@ mod tests {
         let mut other = record(&[1.0], true);
         other.results[0].scene = "t".into();
         assert_eq!(other.regressions(&before, 0.05), (Vec::new(), 0));
+    }
+
+    #[test]
+    fn what_the_baseline_does_not_know_is_named() {
+        let before = record(&[1.0; 3], true);
+        assert_eq!(before.unknown_to(&before), Vec::<String>::new());
+        let mut now = record(&[1.0; 3], true);
+        let also = |scene: &str, backend: &str, metric: &str| Metric {
+            scene: scene.into(),
+            backend: backend.into(),
+            metric: metric.into(),
+            ..before.results[0].clone()
+        };
+        now.results.push(also("s", "bvh", "rate"));
+        now.results.push(also("s", "", "import"));
+        now.results.push(also("t", "bvh", "rate"));
+        now.results.push(also("t", "embree", "rate"));
+        let named = [
+            "rate bvh of s on 2 threads",
+            "import of s on 2 threads",
+            "all of t on 2 threads",
+        ];
+        assert_eq!(now.unknown_to(&before), named);
+        // It is no regression, and what both know is judged still.
+        assert_eq!(now.regressions(&before, 0.05), (Vec::new(), 1));
+        // The other way round nothing is unknown.
+        assert!(before.unknown_to(&now).is_empty());
+    }
+
+    #[test]
+    fn scaling_tells_what_more_threads_gain() {
+        let mut r = record(&[100.0], true);
+        r.results[0].unit = "/s".into();
+        assert_eq!(r.scaling(), "", "one column scales with nothing");
+        let of = |threads, metric: &str, unit: &str, more, median| Metric {
+            threads,
+            metric: metric.into(),
+            unit: unit.into(),
+            more_is_better: more,
+            median,
+            ..r.results[0].clone()
+        };
+        r.results = vec![
+            of(1, "rate", "/s", true, 100.0),
+            of(1, "build", "s", false, 3.0),
+            of(1, "peak", "B", false, 7.0),
+            of(2, "rate", "/s", true, 195.0),
+            of(2, "build", "s", false, 2.0),
+            of(2, "peak", "B", false, 7.0),
+        ];
+        let table = r.scaling();
+        let row = |name: &str| -> Vec<&str> {
+            let found = table.lines().find(|l| l.trim_start().starts_with(name));
+            found.unwrap_or("").split_whitespace().collect()
+        };
+        assert_eq!(
+            row("rate"),
+            ["rate", "embree", "100", "/s", "195", "/s", "x1.95"]
+        );
+        assert_eq!(
+            row("build"),
+            ["build", "embree", "3.00", "s", "2.00", "s", "x1.50"]
+        );
+        assert_eq!(row("peak"), ["peak", "embree", "7.00", "B", "7.00", "B"]);
     }
 
     #[test]
