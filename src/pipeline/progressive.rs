@@ -92,7 +92,25 @@ impl Forecast {
     /// How things stand.
     pub(super) fn standing(&self, film: &Film, samples: u32, at_end_of_pass: bool) -> Standing {
         let error = at_end_of_pass.then(|| film.estimated_error()).flatten();
+        let to_deadline = self
+            .deadline
+            .map(|d| d.saturating_duration_since(Instant::now()).as_secs_f64());
         let own = self.start.elapsed().as_secs_f64();
+        Standing {
+            at_end_of_pass,
+            ..self.foresee(samples, error, own, to_deadline)
+        }
+    }
+
+    /// How things stand with so many samples per pixel and such an error after `own` seconds; the
+    /// deadline is `to_deadline` seconds away, if there is one.
+    fn foresee(
+        &self,
+        samples: u32,
+        error: Option<f64>,
+        own: f64,
+        to_deadline: Option<f64>,
+    ) -> Standing {
         // The squared error falls as one over the samples.
         let by_error = match (self.target, error) {
             (Some(target), Some(error)) => Some(f64::from(samples) * error / target),
@@ -104,16 +122,13 @@ impl Forecast {
         let by_samples = needed
             .filter(|_| taken > 0)
             .map(|n| (n - f64::from(samples)).max(0.0) * own / f64::from(taken));
-        let by_clock = self
-            .deadline
-            .map(|d| d.saturating_duration_since(Instant::now()).as_secs_f64());
         Standing {
-            at_end_of_pass,
+            at_end_of_pass: false,
             samples,
             error,
             samples_needed: needed,
             seconds: self.before.1 + own,
-            seconds_left: [by_samples, by_clock]
+            seconds_left: [by_samples, to_deadline]
                 .into_iter()
                 .flatten()
                 .reduce(f64::min),
@@ -174,6 +189,78 @@ mod tests {
             ..settings()
         };
         assert_eq!(pass(&few, 0).photons.nearest, 5);
+    }
+
+    /// Renders in pretence: passes of a film of which a sample takes `pace(pass)` seconds and whose
+    /// squared error is `noise(pass) / samples`, until `target` or `limit`. Returns all standings
+    /// but the last, and what it took.
+    fn pretend(
+        forecast: &Forecast,
+        pace: &mut dyn FnMut(u32) -> f64,
+        noise: &mut dyn FnMut(u32) -> f64,
+    ) -> (Vec<Standing>, f64) {
+        let (mut own, mut samples, mut told) = (0.0, forecast.before.0, Vec::new());
+        for number in 0.. {
+            let n = pass(&settings(), number).samples;
+            let n = n.min(forecast.limit - samples);
+            own += f64::from(n) * pace(number);
+            samples += n;
+            let error = (number > 0).then(|| noise(number) / f64::from(samples));
+            let standing = forecast.foresee(samples, error, own, None);
+            if standing.reached(forecast.target) || samples == forecast.limit {
+                break;
+            }
+            told.push(standing);
+        }
+        (told, own)
+    }
+
+    #[test]
+    fn the_end_is_foreseen_within_a_quarter_after_the_first_tenth() {
+        let mut rng = crate::sampling::Rng::new(1);
+        let mut within = |x: f64| 1.0 + x * (2.0 * rng.next_1d() - 1.0);
+        let mut seen = 0;
+        for run in 0..200 {
+            // To an error or to a count, from the start or resumed; on a machine that is busy now
+            // and then, by an error that is known the better the more passes there are.
+            let (target, limit) = match run % 2 {
+                0 => (Some(1e-3), u32::MAX),
+                _ => (None, 2000),
+            };
+            let before = if run % 4 < 2 { (0, 0.0) } else { (40, 7.0) };
+            let forecast = Forecast::new(target, limit, None, before);
+            let (pace, noise): (Vec<f64>, Vec<f64>) = (0..10_000u32)
+                .map(|i| {
+                    let known = 0.3 / f64::from(i.max(1)).sqrt();
+                    (0.01 * within(0.3), within(known))
+                })
+                .unzip();
+            let (told, took) = pretend(&forecast, &mut |i| pace[i as usize], &mut |i| {
+                noise[i as usize]
+            });
+            for s in &told {
+                let own = s.seconds - before.1;
+                if own < 0.1 * took {
+                    continue;
+                }
+                let left = s.seconds_left.unwrap_or(f64::NAN);
+                assert!(
+                    (own + left - took).abs() < 0.25 * took,
+                    "run {run}: after {own:.2} s of {took:.2} s, {left:.2} s are said to be left"
+                );
+                seen += 1;
+            }
+        }
+        assert!(seen > 2000, "{seen}");
+    }
+
+    #[test]
+    fn a_deadline_that_comes_first_is_what_is_left() {
+        let forecast = Forecast::new(None, 100, None, (0, 0.0));
+        let left = |to| forecast.foresee(25, None, 10.0, to).seconds_left;
+        assert_eq!(left(None), Some(30.0));
+        assert_eq!(left(Some(5.0)), Some(5.0));
+        assert_eq!(left(Some(50.0)), Some(30.0));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Study;
-use super::curves::{Curve, curves, floor};
+use super::curves::{Curve, curves, floor, resolved};
 use super::layers::{Moments, Scale, names};
 use super::measure::{Kind, Run};
 use super::methods::{CHANGES, preset};
@@ -102,7 +102,8 @@ pub struct Effect {
 /// Everything the report shows.
 #[derive(Clone, Debug, Serialize)]
 pub struct Analysis {
-    /// Factors that an A/A comparison keeps below: of seconds, of errors, of their product.
+    /// Factors that an A/A comparison keeps below: of seconds, of errors, of their product. No
+    /// time is told from another by less than the clock's step.
     pub floor: [f64; 3],
     /// All points: methods by rung, then the base of the changes and the changes.
     pub points: Vec<Point>,
@@ -304,8 +305,14 @@ pub(super) fn analyse(study: &Study) -> Analysis {
     let kind = |p: &Point| study.settings[p.index].kind;
     let twin = |second: bool| all.iter().find(|p| kind(p) == Kind::Again(second));
     let twins = twin(false).zip(twin(true));
+    let tick = study.clock.resolution();
+    let told = |a: &Point, b: &Point| resolved(a.seconds.value, b.seconds.value, tick);
     let floors = match twins {
-        Some((a, b)) => factors(a, b, 0).map(|f| floor(&f)),
+        Some((a, b)) => {
+            let [time, error, both] = factors(a, b, 0);
+            let least = told(a, b);
+            [floor(&time, least), floor(&error, 1.0), floor(&both, least)]
+        }
         None => [1.0; 3],
     };
     let base = all.iter().find(|p| kind(p) == Kind::Base);
@@ -318,6 +325,8 @@ pub(super) fn analyse(study: &Study) -> Analysis {
         .filter_map(|(c, p)| {
             let [time, error, cost] = factors(base?, p, 0);
             let all = [time?, error?, cost?];
+            let least = told(base?, p);
+            let floors = [floors[0].max(least), floors[1], floors[2].max(least)];
             Some(Effect {
                 change: CHANGES[c].name,
                 doc: CHANGES[c].doc,
@@ -334,7 +343,13 @@ pub(super) fn analyse(study: &Study) -> Analysis {
             .collect()
     };
     let ladders: Vec<Vec<&Point>> = (0..study.methods.len()).map(of_method).collect();
-    let curves = curves(&study.methods, &ladders, &study.reference.error, twins);
+    let curves = curves(
+        &study.methods,
+        &ladders,
+        &study.reference.error,
+        twins,
+        tick,
+    );
     let base = base.map(describe);
     let shown = |p: &Point| !matches!(kind(p), Kind::Again(_));
     let points = all.iter().filter(|p| shown(p)).cloned().collect();

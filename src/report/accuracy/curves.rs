@@ -98,15 +98,18 @@ struct Layer {
     own: f64,
     /// Factor of time × error that an A/A comparison of this layer keeps below.
     floor: f64,
+    /// Least time that the clock tells from another, in seconds.
+    tick: f64,
 }
 
 /// The curves of all methods; `ladders` holds the points of each, `own` the reference's error in
-/// each layer, `twins` the A/A pair.
+/// each layer, `twins` the A/A pair, `tick` the least time that the clock tells.
 pub(super) fn curves(
     methods: &[Method],
     ladders: &[Vec<&Point>],
     own: &[f64],
     twins: Option<(&Point, &Point)>,
+    tick: f64,
 ) -> Vec<Curve> {
     let Some(first) = ladders.first() else {
         return Vec::new();
@@ -116,7 +119,8 @@ pub(super) fn curves(
             index,
             levels: levels(ladders, index, own[index]),
             own: own[index],
-            floor: twins.map_or(1.0, |(a, b)| floor(&factors(a, b, index)[2])),
+            floor: twins.map_or(1.0, |(a, b)| floor(&factors(a, b, index)[2], 1.0)),
+            tick,
         })
         .collect();
     methods
@@ -146,9 +150,15 @@ pub(super) fn curves(
 }
 
 /// The factor that two measurements of the same keep below. Whichever way chance went, it could
-/// have gone the other way.
-pub(super) fn floor(factor: &Option<Interval>) -> f64 {
-    factor.map_or(1.0, |i| i.high.max(1.0 / i.low.max(1e-9)))
+/// have gone the other way; and it may have been chance that they agree to less than `least`, the
+/// factor by which what measures them may be off.
+pub(super) fn floor(factor: &Option<Interval>, least: f64) -> f64 {
+    factor.map_or(1.0, |i| i.high.max(1.0 / i.low.max(1e-9)).max(least))
+}
+
+/// The factor by which two times of the same may differ by the clock's step alone.
+pub(super) fn resolved(a: f64, b: f64, tick: f64) -> f64 {
+    1.0 + tick / a.min(b).max(f64::MIN_POSITIVE)
 }
 
 /// Levels of error, 1 and 3 of each power of ten, that some curve passes and the reference tells.
@@ -211,6 +221,12 @@ fn times(ladder: &[&Point], first: &[&Point], layer: &Layer) -> Vec<Level> {
             Reach::Never => None,
         };
         let bound = slow.zip(fast).map(|(s, f)| s / f);
+        let floor = match (of_first, mine) {
+            (Reach::At(a), Reach::At(b)) => layer.floor.max(resolved(a, b, layer.tick)),
+            _ => (slow.zip(fast)).map_or(layer.floor, |(s, f)| {
+                layer.floor.max(resolved(s, f, layer.tick))
+            }),
+        };
         Level {
             error,
             seconds: bootstrap(n, |p| log(ladder, p)).map(exp),
@@ -222,10 +238,38 @@ fn times(ladder: &[&Point], first: &[&Point], layer: &Layer) -> Vec<Level> {
                 Reach::Never => last(ladder),
                 _ => None,
             },
-            differs: ratio.as_ref().is_some_and(|r| differs(r, layer.floor)),
-            ratio_at_least: bound.filter(|b| ratio.is_none() && *b > layer.floor),
+            differs: ratio.as_ref().is_some_and(|r| differs(r, floor)),
+            ratio_at_least: bound.filter(|b| ratio.is_none() && *b > floor),
             ratio,
         }
     };
     layer.levels.iter().map(level).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_floor_lies_below_what_the_clock_tells() {
+        let same = Some(Interval {
+            value: 1.0,
+            low: 1.0,
+            high: 1.0,
+        });
+        // Two times of 50 ms by a clock that goes on every 10 ms: either may be a fifth longer.
+        let least = resolved(0.06, 0.05, 0.01);
+        assert!((least - 1.2).abs() < 1e-12);
+        assert_eq!(floor(&same, least), least);
+        assert_eq!(floor(&same, 1.0), 1.0);
+        // Noise beyond that counts, whichever way it went.
+        for (low, high) in [(0.5, 1.1), (0.9, 2.0)] {
+            let noisy = Some(Interval {
+                value: 1.0,
+                low,
+                high,
+            });
+            assert_eq!(floor(&noisy, least), 2.0);
+        }
+    }
 }

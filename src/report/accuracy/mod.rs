@@ -7,6 +7,7 @@
 //! not over pixels, which share photons.
 
 mod analysis;
+mod clock;
 mod curves;
 mod layers;
 mod measure;
@@ -18,6 +19,7 @@ mod reference;
 mod tables;
 
 pub use analysis::{Analysis, Effect, LayerError, Point};
+pub use clock::Clock;
 pub use curves::{Curve, LayerTimes, Level};
 pub use layers::Layers;
 pub use measure::{Kind, Run, Setting};
@@ -39,33 +41,6 @@ use crate::scene::Scene;
 
 /// Part of the budget that a reference gets which has to be computed.
 const REFERENCE_SHARE: f64 = 0.5;
-
-/// Which time counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Clock {
-    /// Seconds that pass
-    #[default]
-    Wall,
-    /// Seconds of processors, all threads together: steadier where others use the machine too
-    Cpu,
-}
-
-impl Clock {
-    fn of(self, run: &Run) -> f64 {
-        match self {
-            Self::Wall => run.seconds,
-            Self::Cpu => run.cpu_seconds.max(1e-6),
-        }
-    }
-
-    /// What the axis says.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Wall => "seconds",
-            Self::Cpu => "processor seconds",
-        }
-    }
-}
 
 /// What is to be studied.
 #[derive(Clone, Debug)]
