@@ -75,6 +75,8 @@ struct Open {
     probes: [Option<Probe>; 5],
     casters: Vec<u32>,
     weight: f64,
+    /// Whether it may hold something small that no ray has met.
+    search: bool,
 }
 
 /// What is known of a cell.
@@ -136,12 +138,26 @@ impl Planner<'_> {
             .collect();
         checks += 5 * first.len() as u64;
         open.extend(settle(first, &mut leaves));
-        while !open.is_empty() {
-            let room = budget.saturating_sub(leaves.len() as u64 + open.len() as u64) / 3;
-            if room == 0 {
+        let mut waiting: Vec<Open> = Vec::new();
+        loop {
+            if open.is_empty() {
+                open = std::mem::take(&mut waiting);
+            }
+            let cells = leaves.len() + open.len() + waiting.len();
+            let room = budget.saturating_sub(cells as u64) / 3;
+            if room == 0 || open.is_empty() {
                 break;
             }
             if (room as usize) < open.len() {
+                // What is small takes few cells a level and many levels to find. Edges, of which
+                // every level has more, would use up the cells before: they wait.
+                let (search, rest): (Vec<_>, Vec<_>) = open.into_iter().partition(|o| o.search);
+                if !search.is_empty() && !rest.is_empty() {
+                    waiting.extend(rest);
+                    open = search;
+                    continue;
+                }
+                open = if search.is_empty() { rest } else { search };
                 // The last level is split in part: where most is to be gained, and elsewhere as
                 // the order of names would have it, which knows nothing of places.
                 let rank = |o: &Open| crate::sampling::hash2(1, o.cell.key());
@@ -158,7 +174,7 @@ impl Planner<'_> {
                 .collect();
             open = settle(children, &mut leaves);
         }
-        leaves.extend(open.into_iter().map(|o| o.leaf()));
+        leaves.extend(open.into_iter().chain(waiting).map(|o| o.leaf()));
         Grown { leaves, checks }
     }
 
@@ -239,7 +255,7 @@ impl Planner<'_> {
         let near = all.iter().fold(f64::INFINITY, |m, p| m.min(p.distance()));
 
         let mut held = Vec::new();
-        let (mut crossing, mut search) = (None, false);
+        let (mut crossing, mut search, mut unseen) = (None, false, false);
         for &i in casters {
             let c = &self.casters[i as usize];
             let sight = beam.sight(&c.sphere, self.order);
@@ -258,6 +274,7 @@ impl Planner<'_> {
             match sight {
                 Sight::Straddles(p) if c.exact && tree.is_own() => {
                     crossing = Some(crossing.unwrap_or(p));
+                    unseen |= !seen;
                 }
                 _ if !seen => search |= beam.width(dist) > SEARCH * c.sphere.radius,
                 _ => {}
@@ -302,7 +319,8 @@ impl Planner<'_> {
         let blurred = tree.spread > 0.0
             && beam.width(near.min(self.nearest(&held, &beam))) < 0.5 * tree.parallax();
         let split = split_by_hits && !blurred && cell.level < DEEPEST;
-        let open = Open::new(cell, probes, held);
+        let mut open = Open::new(cell, probes, held);
+        open.search = search || unseen;
         let verdict = Verdict { split, weight };
         (open, verdict)
     }
@@ -344,6 +362,7 @@ impl Open {
             probes,
             casters,
             weight: 0.0,
+            search: false,
         }
     }
 
