@@ -21,7 +21,8 @@ use crate::scene::Inside;
 /// far than a pixel.
 const CHAINS: u32 = 2;
 
-/// How far from its own place a chain is believed about what lies there, in pixels.
+/// How far a light may be from the middle of a pixel to be foreseen in it, in pixels, and how far
+/// from there a chain that started in the pixel is believed.
 const REACH: f64 = 1.0;
 
 /// Scattering events up to which a chain is followed.
@@ -46,6 +47,16 @@ pub(super) struct Glint {
     pub(super) mean: f64,
     /// Variance of a sample's luminance.
     pub(super) variance: f64,
+}
+
+/// A light that a chain passes by.
+#[derive(Clone, Copy)]
+struct Sighting {
+    /// Where in the image it would be met, in pixels.
+    at: [f64; 2],
+    /// How far from there it may be seen.
+    reach: f64,
+    glint: Glint,
 }
 
 /// What is looked for, and through what.
@@ -103,7 +114,7 @@ impl<'a> Glints<'a> {
         if self.lights.is_empty() || self.camera.has_lens() {
             return (vec![Glint::default(); count], 0);
         }
-        let found: Vec<(Glint, u64)> = (0..count)
+        let sighted: Vec<(Vec<Sighting>, u64)> = (0..count)
             .into_par_iter()
             .map(|i| {
                 let x = f64::from(region.x0) + (i % width) as f64;
@@ -111,33 +122,56 @@ impl<'a> Glints<'a> {
                 self.pixel([x, y])
             })
             .collect();
-        let rays = found.iter().map(|(_, rays)| rays).sum();
-        (found.into_iter().map(|(glint, _)| glint).collect(), rays)
+        let rays = sighted.iter().map(|(_, rays)| rays).sum();
+        // What a chain tells of may lie in the next pixel, whose own chains go elsewhere.
+        let around = |k: usize, end: usize| k.saturating_sub(1)..(k + 2).min(end);
+        let found = (0..count)
+            .into_par_iter()
+            .map(|i| {
+                let (x, y) = (i % width, i / width);
+                let middle = [
+                    f64::from(region.x0) + x as f64 + 0.5,
+                    f64::from(region.y0) + y as f64 + 0.5,
+                ];
+                around(y, count / width)
+                    .flat_map(|y| around(x, width).map(move |x| y * width + x))
+                    .flat_map(|k| &sighted[k].0)
+                    .filter(|s| s.near(middle))
+                    .map(|s| s.glint)
+                    .fold(Glint::default(), |a, b| {
+                        if b.variance > a.variance { b } else { a }
+                    })
+            })
+            .collect();
+        (found, rays)
     }
 
-    /// The most that any of the pixel's chains foresees.
-    fn pixel(&self, [x, y]: [f64; 2]) -> (Glint, u64) {
-        let mut most = Glint::default();
+    /// What the chains of a pixel pass by, and the rays traced.
+    fn pixel(&self, [x, y]: [f64; 2]) -> (Vec<Sighting>, u64) {
+        let mut sighted = Vec::new();
         let mut rays = 0;
         for k in 0..CHAINS * CHAINS {
             let at = |k: u32| (f64::from(k) + 0.5) / f64::from(CHAINS);
-            let [jx, jy] = [at(k % CHAINS), at(k / CHAINS)];
-            let found = self.follow([x + jx, y + jy], [jx - 0.5, jy - 0.5], &mut rays);
-            if found.variance > most.variance {
-                most = found;
-            }
+            let from = [x + at(k % CHAINS), y + at(k / CHAINS)];
+            self.follow(from, [x + 0.5, y + 0.5], &mut sighted, &mut rays);
         }
-        (most, rays)
+        (sighted, rays)
     }
 
-    /// Follows the chain through a point of the image, `off` from the middle of its pixel.
-    fn follow(&self, [x, y]: [f64; 2], off: [f64; 2], rays: &mut u64) -> Glint {
+    /// Follows the chain through a point of the image, in a pixel around `middle`.
+    fn follow(
+        &self,
+        from: [f64; 2],
+        middle: [f64; 2],
+        sighted: &mut Vec<Sighting>,
+        rays: &mut u64,
+    ) {
         let cx = self.context;
+        let [x, y] = from;
         let start = self.spacing.camera_ray(self.camera, x, y, [0.5; 2], true);
-        let mut found = Glint::default();
         let mut waiting = ArrayVec::<Chain, WAITING>::new();
         let Some(differential) = start.differential else {
-            return found;
+            return;
         };
         waiting.push(Chain {
             ray: start.ray,
@@ -148,7 +182,7 @@ impl<'a> Glints<'a> {
             depth: 0,
         });
         while let Some(chain) = waiting.pop() {
-            self.look(&chain, off, &mut found, rays);
+            self.look(&chain, from, middle, sighted, rays);
             *rays += 1;
             let Some(hit) = cx.accel.intersect(&chain.ray) else {
                 continue;
@@ -189,11 +223,17 @@ impl<'a> Glints<'a> {
                 });
             }
         }
-        found
     }
 
     /// Adds the lights that a segment of a chain may meet from elsewhere in its pixel.
-    fn look(&self, chain: &Chain, off: [f64; 2], found: &mut Glint, rays: &mut u64) {
+    fn look(
+        &self,
+        chain: &Chain,
+        from: [f64; 2],
+        middle: [f64; 2],
+        sighted: &mut Vec<Sighting>,
+        rays: &mut u64,
+    ) {
         let cx = self.context;
         let o = chain.ray.origin();
         let d = chain.ray.direction().normalize();
@@ -220,15 +260,26 @@ impl<'a> Glints<'a> {
             });
             let side = to - d * ahead;
             let area = right.cross(down).dot(d);
-            let x = side.cross(down).dot(d) / area + off[0];
-            let y = right.cross(side).dot(d) / area + off[1];
             // Pixels that its image covers, if the chain maps it evenly.
             let image = to.length_squared() / (li.pdf * area.abs());
             if !(image > 0.0 && image < 1.0) {
                 continue;
             }
-            let reach = REACH + 0.5 * image.sqrt();
-            if !(x.abs() <= reach && y.abs() <= reach) {
+            let (x, y) = (side.cross(down).dot(d), right.cross(side).dot(d));
+            let sighting = Sighting {
+                at: [from[0] + x / area, from[1] + y / area],
+                reach: REACH + 0.5 * image.sqrt(),
+                glint: {
+                    let seen = (chain.beta * li.radiance).luminance();
+                    // One sample in so many meets it, and carries by so much more where chance chose.
+                    let carried = seen * chain.certain * li.radiance.luminance();
+                    Glint {
+                        mean: seen * image,
+                        variance: carried * image * (1.0 - image),
+                    }
+                },
+            };
+            if !sighting.near(middle) {
                 continue;
             }
             *rays += 1;
@@ -237,11 +288,14 @@ impl<'a> Glints<'a> {
             if cx.accel.occluded(&way) {
                 continue;
             }
-            let seen = (chain.beta * li.radiance).luminance();
-            found.mean += seen * image;
-            // One sample in so many meets it, and carries by so much more where chance chose.
-            let carried = seen * chain.certain * li.radiance.luminance();
-            found.variance += carried * image * (1.0 - image);
+            sighted.push(sighting);
         }
+    }
+}
+
+impl Sighting {
+    fn near(&self, middle: [f64; 2]) -> bool {
+        let off = |i: usize| (self.at[i] - middle[i]).abs();
+        off(0) <= self.reach && off(1) <= self.reach
     }
 }
