@@ -192,7 +192,7 @@ fn an_interrupt_leaves_a_valid_image() {
     use std::io::{BufRead, BufReader};
     let directory = tempfile::tempdir().unwrap();
     let d = directory.path();
-    // The first progress line comes when rendering is well under way.
+    // The first progress line comes when rendering is well under way; notes come before.
     let mut child = command(
         d,
         "-o a.exr --size 16x16 --photons 1k --caustic-photons 1k --spp 1G",
@@ -201,7 +201,11 @@ fn an_interrupt_leaves_a_valid_image() {
     .spawn()
     .unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
-    let first = lines.next().unwrap().unwrap();
+    let first = lines
+        .by_ref()
+        .map(Result::unwrap)
+        .find(|l| !l.contains("note: "))
+        .unwrap();
     interrupt(&child);
     let rest: Vec<String> = lines.map(Result::unwrap).collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{first} {rest:?}");
