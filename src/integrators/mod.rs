@@ -11,6 +11,7 @@ mod photon;
 mod pixel_edges;
 mod pixel_glints;
 mod pixel_plan;
+mod pixel_shares;
 mod settings;
 mod stored_light;
 mod trials;
