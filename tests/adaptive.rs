@@ -6,12 +6,11 @@ mod common;
 #[path = "hardcases/report.rs"]
 mod report;
 
-use std::sync::Arc;
-
+use common::render::bvh;
 use common::{add_quad, add_room, add_sphere, glass, lambert, lamp, light};
-use dualight::accel::{ACCELERATORS, Accelerator};
+use dualight::accel::Accelerator;
 use dualight::color::Rgb;
-use dualight::geometry::{Geometry, TriangleMesh, sphere};
+use dualight::geometry::{TriangleMesh, sphere};
 use dualight::lights::LightDesc;
 use dualight::math::{DAffine3, DVec3};
 use dualight::photons::{EMISSIONS, EmissionContext, EmittedPhoton, PhotonSource, Purpose};
@@ -24,11 +23,6 @@ fn scene(f: impl FnOnce(&mut SceneBuilder)) -> Scene {
     let mut b = SceneBuilder::default();
     f(&mut b);
     b.finish().unwrap()
-}
-
-fn accelerator(g: &Arc<Geometry>) -> Box<dyn Accelerator> {
-    let bvh = ACCELERATORS.iter().find(|e| e.name == "bvh").unwrap();
-    (bvh.build)(g, 1).unwrap()
 }
 
 /// Calls `f` with the named emission.
@@ -137,7 +131,7 @@ fn the_flux_of_every_light_is_exact() {
     for kind in KINDS {
         for mesh in [false, true] {
             let scene = balls(kind, mesh);
-            let accel = accelerator(&scene.geometry);
+            let accel = bvh(&scene.geometry);
             let told = (3, Purpose::Global, 20_000);
             let cells = ["adaptive", "adaptive-linear"].map(|name| {
                 let (sum, n, cells) = with_source(name, &scene, &*accel, told, |s| {
@@ -203,7 +197,7 @@ fn alike(row: &mut Row) {
         for kind in KINDS {
             for mesh in [false, true] {
                 let scene = balls(kind, mesh);
-                let accel = accelerator(&scene.geometry);
+                let accel = bvh(&scene.geometry);
                 let run = |name: &'static str, offset: u64| -> Vec<Vec<f64>> {
                     (0..SEEDS)
                         .into_par_iter()
@@ -331,7 +325,7 @@ fn the_variance_of_the_flux_through_a_silhouette_falls_with_the_third_power() {
         add_sphere(b, "ball", grey, c, r);
         b.add_light(light("point", DVec3::ZERO, DVec3::Y, 1.0));
     });
-    let accel = accelerator(&ball.geometry);
+    let accel = bvh(&ball.geometry);
     let total = ball.flux().luminance();
     let seeds = |n: u64, f: &(dyn Fn(u64) -> f64 + Sync)| -> f64 {
         variance(&(0..n).into_par_iter().map(f).collect::<Vec<_>>())
@@ -401,7 +395,7 @@ fn the_variance_of_the_flux_through_a_silhouette_falls_with_the_third_power() {
 
 /// Cells of an adaptive emission.
 fn cells(scene: &Scene, purpose: Purpose, count: u64) -> u64 {
-    let accel = accelerator(&scene.geometry);
+    let accel = bvh(&scene.geometry);
     with_source("adaptive", scene, &*accel, (0, purpose, count), |s| {
         s.cells()
     })
@@ -455,7 +449,7 @@ fn flat_and_smooth(row: &mut Row) {
         })
     };
     let [smooth, sphere] = [outline(true), outline(false)].map(|s| {
-        let accel = accelerator(&s.geometry);
+        let accel = bvh(&s.geometry);
         with_source("adaptive", &s, &*accel, (0, Purpose::Global, 40_000), |s| {
             // Where the photons of small cells go, seen from the light's axis.
             let mean = photons(s).map(|p| p.power.r).fold(0.0f64, f64::max);
@@ -491,7 +485,7 @@ fn a_tiny_caster_is_found_without_being_hit() {
             }
             b.add_light(light("point", DVec3::ZERO, DVec3::Y, 1.0));
         });
-        let accel = accelerator(&tiny.geometry);
+        let accel = bvh(&tiny.geometry);
         let told = (0, Purpose::Caustic, 1200);
         let (n, hits, checks) = with_source("adaptive", &tiny, &*accel, told, |s| {
             let hits =
@@ -508,7 +502,7 @@ fn a_tiny_caster_is_found_without_being_hit() {
 #[test]
 fn photons_do_not_depend_on_threads() {
     let scene = balls("area", true);
-    let accel = accelerator(&scene.geometry);
+    let accel = bvh(&scene.geometry);
     let all = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -539,7 +533,7 @@ fn every_light_emits_whatever_the_budget() {
             b.add_light(light("point", DVec3::new(x, 0.0, 0.0), DVec3::Y, 1.0));
         }
     });
-    let accel = accelerator(&many.geometry);
+    let accel = bvh(&many.geometry);
     for count in [1, 10, 1000, 30_000] {
         with_source(
             "adaptive",
@@ -586,7 +580,7 @@ fn occluder(row: &mut Row) {
     let mut m = Meter::default();
     m.must(cells(&both(false), Purpose::Global, 40_000) == 64);
     let lit = both(true);
-    let accel = accelerator(&lit.geometry);
+    let accel = bvh(&lit.geometry);
     let told = (0, Purpose::Global, 40_000);
     let angles: Vec<f64> = with_source("adaptive", &lit, &*accel, told, |s| {
         let most = photons(s).map(|p| p.power.r).fold(0.0f64, f64::max);

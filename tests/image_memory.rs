@@ -4,26 +4,14 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod asset;
-
-use std::fs;
+#[path = "common/memory.rs"]
+mod memory;
 
 use asset::Asset;
 use dualight::textures::{Content, Image, Texels};
 use image::{ImageFormat, RgbImage};
+use memory::{forget, peak};
 use serde_json::json;
-
-/// Most bytes in memory since [`forget`].
-fn peak() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kilobytes * 1024)
-}
-
-/// Makes [`peak`] begin anew.
-fn forget() -> Option<()> {
-    fs::write("/proc/self/clear_refs", "5").ok()
-}
 
 /// A flat image of this size as PNG: a few kilobytes.
 fn png(side: u32) -> Vec<u8> {

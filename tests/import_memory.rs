@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod asset;
+#[path = "common/memory.rs"]
+mod memory;
 
 use std::fs;
 use std::path::Path;
@@ -12,20 +14,8 @@ use asset::Asset;
 use dualight::geometry::Shape;
 use dualight::import::{ImportOptions, load};
 use dualight::scene::ScenePlugins;
+use memory::{forget, peak};
 use serde_json::{Value, json};
-
-/// Most bytes in memory since [`forget`].
-fn peak() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kilobytes * 1024)
-}
-
-/// Makes [`peak`] begin anew.
-fn forget() -> Option<()> {
-    fs::write("/proc/self/clear_refs", "5").ok()
-}
 
 /// Meshes of a file, and quads along one side of each.
 const MESHES: usize = 40;

@@ -4,13 +4,14 @@
 
 mod common;
 
+use common::render::plain_pixels;
 use common::{add_quad, add_sphere, camera, glass, lambert, lamp, mirror};
 use dualight::color::Rgb;
 use dualight::control::Control;
 use dualight::film::Image;
 use dualight::materials::MaterialDesc;
 use dualight::math::DVec3;
-use dualight::pipeline::{PixelSampling, RenderSettings, render};
+use dualight::pipeline::{PixelSampling, render};
 use dualight::plugins::Registry;
 use dualight::scene::{Scene, SceneBuilder};
 use rayon::prelude::*;
@@ -64,17 +65,7 @@ fn ball(material: &MaterialDesc) -> Scene {
 }
 
 fn image(scene: &Scene, pixel_sampling: PixelSampling, seed: u64) -> Image {
-    let mut settings = RenderSettings {
-        effects: "-indirect,-caustics".into(),
-        width: SIDE,
-        height: SIDE,
-        spp: SPP,
-        pixel_sampling,
-        accelerator: Some("bvh".into()),
-        threads: Some(1),
-        ..RenderSettings::default()
-    };
-    settings.integrator_settings.seed = seed;
+    let settings = plain_pixels([SIDE, SPP], pixel_sampling, seed);
     let registry = Registry::builtin();
     let rendering = render(scene, &settings, &registry, &Control::default()).unwrap();
     rendering.film.develop()

@@ -4,6 +4,7 @@
 
 mod common;
 
+use common::render::plain_pixels;
 use common::{add_quad, add_sphere, camera, lambert, lamp, light};
 use dualight::color::Rgb;
 use dualight::control::Control;
@@ -45,19 +46,11 @@ fn thin() -> Scene {
 }
 
 fn settings(pixel_sampling: PixelSampling, seed: u64) -> RenderSettings {
-    let mut out = RenderSettings {
-        // Direct light alone: it has no other noise than that of the pixels.
+    RenderSettings {
+        // Direct light alone.
         effects: "-indirect,-caustics,-specular,-refraction".into(),
-        width: SIDE,
-        height: SIDE,
-        spp: SPP,
-        pixel_sampling,
-        accelerator: Some("bvh".into()),
-        threads: Some(1),
-        ..RenderSettings::default()
-    };
-    out.integrator_settings.seed = seed;
-    out
+        ..plain_pixels([SIDE, SPP], pixel_sampling, seed)
+    }
 }
 
 fn image(scene: &Scene, settings: &RenderSettings) -> Image {

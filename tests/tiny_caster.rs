@@ -5,14 +5,14 @@
 mod common;
 
 use std::f64::consts::PI;
-use std::sync::Arc;
 
+use common::render::bvh;
 use common::{add_quad, add_room, add_sphere, glass, lambert, light};
-use dualight::accel::{ACCELERATORS, Accelerator};
+use dualight::accel::Accelerator;
 use dualight::color::Rgb;
 use dualight::control::Control;
 use dualight::effects::EffectSet;
-use dualight::geometry::{Geometry, sphere};
+use dualight::geometry::sphere;
 use dualight::math::DVec3;
 use dualight::photons::{
     EMISSIONS, EmissionContext, PhotonSettings, PhotonSource, Purpose, follow_photons,
@@ -50,11 +50,6 @@ fn scene(solid_angle: f64, room: bool) -> Scene {
     b.finish().unwrap()
 }
 
-fn accelerator(g: &Arc<Geometry>) -> Box<dyn Accelerator> {
-    let bvh = ACCELERATORS.iter().find(|e| e.name == "bvh").unwrap();
-    (bvh.build)(g, 1).unwrap()
-}
-
 fn with_source<R>(
     name: &str,
     (scene, accel): (&Scene, &dyn Accelerator),
@@ -83,7 +78,7 @@ struct Pass {
 
 /// Emits so many photons toward the caustic map.
 fn caustic_pass(name: &str, scene: &Scene, seed: u64, count: u64) -> Pass {
-    let accel = accelerator(&scene.geometry);
+    let accel = bvh(&scene.geometry);
     let settings = PhotonSettings {
         seed,
         global: 0,
@@ -132,7 +127,7 @@ fn until_enough(name: &str, scene: &Scene, seed: u64) -> Pass {
 fn photons_that_are_not_aimed_meet_the_ball_as_often_as_its_solid_angle_says() {
     let solid_angle = 1e-4;
     let scene = scene(solid_angle, false);
-    let accel = accelerator(&scene.geometry);
+    let accel = bvh(&scene.geometry);
     let count = 4_000_000;
     let told = (5, Purpose::Global, count);
     let (hits, seconds) = with_source("uniform", (&scene, &*accel), told, |source| {
@@ -194,7 +189,7 @@ fn a_thousand_times_fewer_photons_fill_the_caustic_map() {
 fn misses_forecast_the_ball() {
     for room in [false, true] {
         let tiny = scene(1e-6, room);
-        let accel = accelerator(&tiny.geometry);
+        let accel = bvh(&tiny.geometry);
         let count = 20_000;
         let mut met = [0; 2];
         for (name, met) in ["adaptive", "uniform"].into_iter().zip(&mut met) {

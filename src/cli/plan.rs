@@ -370,6 +370,27 @@ mod tests {
     }
 
     #[test]
+    fn pixels_are_sampled_adaptively_where_that_pays() {
+        let registry = Registry::builtin();
+        for (options, integrator, want) in [
+            ("", "photon", PixelSampling::Adaptive),
+            ("", "path", PixelSampling::Uniform),
+            ("", "hybrid", PixelSampling::Uniform),
+            ("--target-error 0.01", "photon", PixelSampling::Uniform),
+            ("--pixel-sampling uniform", "photon", PixelSampling::Uniform),
+            ("--pixel-sampling adaptive", "path", PixelSampling::Adaptive),
+        ] {
+            let plan = plan(options).unwrap();
+            let entry = registry.integrators.find(integrator).unwrap();
+            assert_eq!(
+                plan.pixel_sampling_for(entry),
+                want,
+                "{options} {integrator}"
+            );
+        }
+    }
+
+    #[test]
     fn options_arrive_where_they_belong() {
         let p = plan("--quality draft --photons 7k").unwrap();
         let i = integrator_settings(&p.args, SQUARE);

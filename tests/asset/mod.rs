@@ -178,3 +178,26 @@ fn width(kind: &str) -> usize {
         _ => 16,
     }
 }
+
+/// A triangle, and node 1 with what `node` says.
+pub fn with_node(node: Value) -> Asset {
+    let mut a = Asset::triangle();
+    a.json["nodes"] = json!([{"mesh": 0}, node]);
+    a.json["scenes"] = json!([{"nodes": [0, 1]}]);
+    a
+}
+
+/// A triangle under a lamp, as `KHR_lights_punctual` has it.
+pub fn with_light(light: Value) -> Asset {
+    let mut a = with_node(json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
+    a.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
+    a
+}
+
+/// A triangle under an area light, as our extras have it.
+pub fn area(area: Value) -> Asset {
+    with_node(json!({
+        "name": "Area", "scale": [2, 3, 1],
+        "extras": {"dualight": {"area_light": area}, "stranger": 1}
+    }))
+}

@@ -1,10 +1,13 @@
 //! Rendering tiny images in tests.
 
-use dualight::accel::ACCELERATORS;
+use std::sync::Arc;
+
+use dualight::accel::{ACCELERATORS, Accelerator};
 use dualight::control::Control;
 use dualight::film::Image;
+use dualight::geometry::Geometry;
 use dualight::integrators::IntegratorSettings;
-use dualight::pipeline::{self, RenderSettings, Rendering};
+use dualight::pipeline::{self, PixelSampling, RenderSettings, Rendering};
 use dualight::plugins::Registry;
 use dualight::scene::Scene;
 
@@ -36,6 +39,33 @@ pub const MODES: [Mode; 3] = [PATH, GATHER, DIRECT_MAP];
 /// Names of the ray tracing backends.
 pub fn backends() -> Vec<&'static str> {
     ACCELERATORS.iter().map(|a| a.name).collect()
+}
+
+/// Our own hierarchy of a scene's shapes.
+pub fn bvh(geometry: &Arc<Geometry>) -> Box<dyn Accelerator> {
+    let bvh = ACCELERATORS.iter().find(|e| e.name == "bvh").unwrap();
+    (bvh.build)(geometry, 1).unwrap()
+}
+
+/// Settings of a square image of so many pixels and samples, by one thread and without indirect
+/// light and caustics: its noise is that of the pixels.
+pub fn plain_pixels(
+    [side, spp]: [u32; 2],
+    pixel_sampling: PixelSampling,
+    seed: u64,
+) -> RenderSettings {
+    let mut out = RenderSettings {
+        effects: "-indirect,-caustics".into(),
+        width: side,
+        height: side,
+        spp,
+        pixel_sampling,
+        accelerator: Some("bvh".into()),
+        threads: Some(1),
+        ..RenderSettings::default()
+    };
+    out.integrator_settings.seed = seed;
+    out
 }
 
 /// How large a test's renderings are.
