@@ -3,9 +3,11 @@
 mod clock;
 mod foreseen;
 mod photon_file;
+mod prepared;
 mod progressive;
 
 pub use photon_file::{PhotonFile, load_photons, save_photons};
+pub use prepared::{Prepared, prepare};
 pub use progressive::{Progressive, Session, Standing};
 
 use clock::Clock;
@@ -134,6 +136,7 @@ pub fn render(
         seconds: 0.0,
         watch: &mut |_, _| {},
         photons: None,
+        prepared: None,
     };
     render_session(scene, settings, registry, control, session)
 }
@@ -189,17 +192,11 @@ fn render_in_pool(
     let effects = effects::survey(scene, &settings.effects, &registry.effects)?;
     clock.lap("survey");
 
-    let accel = {
-        let _stage = control.stage("build", "primitives", 0);
-        scene.geometry.prepare();
-        (backend.build)(&scene.geometry, rayon::current_num_threads())?
+    let Prepared { accel, laps } = match session.prepared {
+        Some(prepared) => prepared,
+        None => prepared::build(scene, settings, registry, control)?,
     };
-    clock.lap("build");
-
-    if !scene.textures.is_empty() {
-        scene.prepare_textures();
-        clock.lap("textures");
-    }
+    clock.take(laps);
 
     let first = PhotonSettings {
         seed: options.seed,

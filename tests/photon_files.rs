@@ -44,6 +44,7 @@ fn render(
         seconds: 0.0,
         watch: &mut |_, _| {},
         photons,
+        prepared: None,
     };
     let (registry, control) = (Registry::builtin(), Control::default());
     pipeline::render_session(scene, settings, &registry, &control, session)

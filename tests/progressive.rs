@@ -60,6 +60,7 @@ fn render(
         seconds: 0.0,
         watch: &mut watch,
         photons: None,
+        prepared: None,
     };
     pipeline::render_session(scene(), settings, registry(), control, session).unwrap()
 }

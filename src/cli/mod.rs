@@ -4,6 +4,7 @@
 mod accuracy;
 pub mod args;
 mod bench;
+mod choice;
 mod compare;
 mod console;
 mod diff;

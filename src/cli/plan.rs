@@ -9,7 +9,7 @@ use super::values::{Size, Sky};
 use crate::effects;
 use crate::error::{Error, Result};
 use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits, SolidGlass};
-use crate::integrators::{IntegratorEntry, IntegratorSettings, PhotonNeeds, suited};
+use crate::integrators::{IntegratorEntry, IntegratorSettings, PhotonNeeds};
 use crate::output::{self, OutputSettings};
 use crate::pipeline::{PhotonFile, PixelSampling, Progressive, RenderSettings};
 use crate::plugins::Registry;
@@ -152,29 +152,25 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The integrator and why it was chosen.
-    ///
-    /// # Errors
-    /// A wish for effects that names none.
-    pub fn integrator_for(
-        &self,
-        scene: &Scene,
-        registry: &Registry,
-    ) -> Result<(&'static str, String)> {
-        if let Some(name) = named_integrator(&self.args) {
-            let name = registry.integrators.find(name)?.name;
-            return Ok((name, "as was asked for".into()));
-        }
-        let effects = effects::survey(scene, &self.settings.effects, &registry.effects)?;
+    /// The integrator that was named, if any was.
+    pub fn named_integrator(&self) -> Option<&str> {
+        named_integrator(&self.args)
+    }
+
+    /// The wish for effects.
+    pub fn effects(&self) -> &str {
+        &self.settings.effects
+    }
+
+    /// Whether an option was given that only photons have a use for.
+    pub fn asks_for_photons(&self) -> bool {
         let a = &self.args;
-        let photons = a.photons.is_some()
+        a.photons.is_some()
             || a.caustic_photons.is_some()
             || a.nearest.is_some()
             || a.gather.is_some()
             || a.emission.is_some()
-            || self.photons.is_some();
-        let (entry, why) = suited(&registry.integrators, scene, effects.set, photons)?;
-        Ok((entry.name, why))
+            || self.photons.is_some()
     }
 
     /// Options that were given and that an integrator has no use for.

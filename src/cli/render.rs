@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::args::RenderArgs;
+use super::choice::{self, Choice};
 use super::keep::Keeper;
 use super::plan::{Plan, StatisticsTarget, camera_note};
 use super::summary::{self, Summary};
@@ -46,7 +47,11 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
             console::say(format_args!("warning: {warning}"));
         }
     }
-    let (integrator, reason) = plan.integrator_for(&scene, &registry)?;
+    let Choice {
+        integrator,
+        reason,
+        prepared,
+    } = choice::choose(&plan, &scene, &registry, &control)?;
     let settings = plan.settings_for(&scene, integrator, &registry)?;
     if !plan.quiet {
         if let Some(note) = camera_note(&scene, settings.camera.as_deref()) {
@@ -83,6 +88,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Ending> {
         film: earlier.map(|c| c.film),
         watch: &mut |film, standing| keeper.watch(film, standing),
         photons: plan.photons.clone(),
+        prepared,
     };
     let mut rendering = pipeline::render_session(&scene, &settings, &registry, &control, session)?;
     // Memory is wanted for the image now.

@@ -15,7 +15,7 @@ pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     doc: "path tracing, with caustics from photons",
     photons: PhotonNeeds::Caustic,
     // Where photons are worth having, those of the final gather are too.
-    suits: |_, _| None,
+    suits: |_| None,
     build: |cx| match cx.maps.caustic {
         None => Box::new(Path::<false> { cx }),
         Some(_) => Box::new(Path::<true> { cx }),

@@ -6,6 +6,8 @@ mod footprint;
 mod gather;
 mod hybrid;
 mod light_sampling;
+mod noise;
+mod outlook;
 mod path;
 mod photon;
 mod pixel_edges;
@@ -19,6 +21,8 @@ mod visibility;
 
 pub use camera_pass::{Region, camera_pass};
 pub use footprint::Spacing;
+pub use noise::noise;
+pub use outlook::{Outlook, Trial};
 pub use pixel_plan::{PixelPlan, planned_camera_pass};
 pub use settings::IntegratorSettings;
 pub use trials::enclosed;
@@ -33,7 +37,7 @@ use crate::math::DVec3;
 use crate::photons::PhotonMaps;
 use crate::registry::Table;
 use crate::sampling::Sampler;
-use crate::scene::{Census, Scene};
+use crate::scene::Scene;
 use crate::stats::RayCounts;
 
 /// What integrators see.
@@ -137,33 +141,34 @@ pub struct IntegratorEntry {
     pub doc: &'static str,
     /// Which photon maps it reads.
     pub photons: PhotonNeeds,
-    /// Why a scene of which these effects are simulated should be rendered by it if nobody says
-    /// how; `None` if it should not.
-    pub suits: fn(&Census, EffectSet) -> Option<String>,
+    /// Why a scene of which this is known should be rendered by it if nobody says how; `None` if it
+    /// should not.
+    pub suits: fn(&Outlook) -> Option<String>,
     /// Makes it.
     pub build: for<'a> fn(RenderContext<'a>) -> Box<dyn Integrator + 'a>,
 }
 
 crate::registry::impl_entry!(IntegratorEntry, "integrator");
 
-/// The integrator that suits a scene, and why: the first of the table that says so. If
-/// photons are asked for, only those that read all photon maps.
+/// The integrator that suits a scene, and why: the first of the table that says so.
+///
+/// # Errors
+/// An empty table.
 pub fn suited<'t>(
     table: &'t Table<IntegratorEntry>,
-    scene: &Scene,
-    effects: EffectSet,
-    photons: bool,
+    outlook: &Outlook,
 ) -> Result<(&'t IntegratorEntry, String)> {
-    let census = Census::new(scene);
     let mut entries = table.entries().iter();
-    if photons {
-        if let Some(e) = entries.find(|e| e.photons == PhotonNeeds::All) {
-            return Ok((e, "photons were asked for".into()));
-        }
-    } else if let Some(found) = entries.find_map(|e| Some((e, (e.suits)(&census, effects)?))) {
+    if let Some(found) = entries.find_map(|e| Some((e, (e.suits)(outlook)?))) {
         return Ok(found);
     }
     Ok((table.choose(None)?, "the first of the table".into()))
+}
+
+/// The first integrator that reads all photon maps, for who asks for photons.
+pub fn with_photons(table: &Table<IntegratorEntry>) -> Option<&IntegratorEntry> {
+    let mut entries = table.entries().iter();
+    entries.find(|e| e.photons == PhotonNeeds::All)
 }
 
 /// The integrators; the first is the default of the library, where nobody looks at the scene.

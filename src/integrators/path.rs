@@ -374,11 +374,6 @@ pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "path",
     doc: "unbiased path tracing with next-event estimation and MIS: the reference",
     photons: PhotonNeeds::None,
-    suits: |census, _| {
-        Some(match census.sharp_objects {
-            0 => "no mirror or glass is sharp enough for photons to help".into(),
-            n => format!("{n} sharp mirrors or glasses throw no caustics that are simulated"),
-        })
-    },
+    suits: |outlook| Some(outlook.wants_paths()),
     build: |cx| Box::new(Path::<false> { cx }),
 };

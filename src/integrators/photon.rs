@@ -17,7 +17,6 @@ use super::{Integrator, IntegratorEntry, PhotonNeeds, RenderContext, Sample, Scr
 use arrayvec::ArrayVec;
 
 use crate::color::Rgb;
-use crate::effects::EffectSet;
 use crate::film::{Component, PixelSample};
 use crate::geometry::{Differential, Ray};
 use crate::materials::{Bsdf, LobeClass, TransportMode};
@@ -256,13 +255,6 @@ pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "photon",
     doc: "photon mapping: direct light by shadow rays, caustics and indirect light from photons",
     photons: PhotonNeeds::All,
-    suits: |census, effects| {
-        (effects.contains(EffectSet::CAUSTICS) && census.sharp_objects > 0).then(|| {
-            format!(
-                "{} sharp mirrors or glasses throw caustics",
-                census.sharp_objects
-            )
-        })
-    },
+    suits: super::Outlook::wants_photons,
     build: |cx| Box::new(PhotonMapping { cx }),
 };

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::PhotonFile;
+use super::{PhotonFile, Prepared};
 use crate::film::Film;
 use crate::photons::{PhotonPass, PhotonSettings, SAMPLES_PER_PASS};
 
@@ -29,6 +29,8 @@ pub struct Session<'a> {
     pub watch: &'a mut (dyn FnMut(&Film, &Standing) + Send),
     /// A file that photons are kept in; not with [`Progressive`].
     pub photons: Option<PhotonFile>,
+    /// What was built already, of the same scene by the same backend.
+    pub prepared: Option<Prepared>,
 }
 
 /// How far a rendering in passes is.

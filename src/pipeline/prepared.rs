@@ -1,0 +1,188 @@
+//! What rendering needs of a scene besides the scene, made once; and a trial of it.
+
+use super::clock::Clock;
+use super::foreseen::hindrance;
+use super::{PixelSampling, RenderSettings, choose_camera, in_pool};
+use crate::accel::Accelerator;
+use crate::control::Control;
+use crate::effects::{self, EffectSet};
+use crate::error::Result;
+use crate::integrators::{PhotonNeeds, RenderContext, Spacing, Trial, Visibility, noise};
+
+use crate::photons::map::PhotonMap;
+use crate::photons::{Photon, PhotonMaps, PhotonSettings, trace_photons};
+use crate::plugins::Registry;
+use crate::scene::Scene;
+use crate::stats::StageTime;
+
+/// Samples of a pixel in a trial.
+const SAMPLES: u32 = 4;
+
+/// Samples of the picture for each one of a trial.
+const SHARE: f64 = 50.0;
+
+/// Fewest and most pixels of a trial.
+const PIXELS: [f64; 2] = [256.0, 4096.0];
+
+/// Photons of each map in a trial.
+const PHOTONS: u64 = 4096;
+
+/// The ray tracer of a scene, and what it took.
+pub struct Prepared {
+    pub(super) accel: Box<dyn Accelerator>,
+    pub(super) laps: Vec<StageTime>,
+}
+
+/// Builds what rendering by these settings needs; [`Session::prepared`](super::Session::prepared)
+/// takes it.
+///
+/// # Errors
+/// Names that no plugin has, a backend that fails.
+pub fn prepare(
+    scene: &Scene,
+    settings: &RenderSettings,
+    registry: &Registry,
+    control: &Control,
+) -> Result<Prepared> {
+    in_pool(settings.threads, || {
+        build(scene, settings, registry, control)
+    })?
+}
+
+pub(super) fn build(
+    scene: &Scene,
+    settings: &RenderSettings,
+    registry: &Registry,
+    control: &Control,
+) -> Result<Prepared> {
+    let mut clock = Clock::default();
+    let backend = registry
+        .accelerators
+        .choose(settings.accelerator.as_deref())?;
+    let accel = {
+        let _stage = control.stage("build", "primitives", 0);
+        scene.geometry.prepare();
+        (backend.build)(&scene.geometry, rayon::current_num_threads())?
+    };
+    clock.lap("build");
+    if !scene.textures.is_empty() {
+        scene.prepare_textures();
+        clock.lap("textures");
+    }
+    Ok(Prepared {
+        accel,
+        laps: clock.laps,
+    })
+}
+
+impl Prepared {
+    /// Follows a few paths and photons, to see which integrator suits the scene. The same settings
+    /// tell the same every time.
+    ///
+    /// # Errors
+    /// As [`render`](super::render).
+    pub fn try_out(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        registry: &Registry,
+        control: &Control,
+    ) -> Result<Trial> {
+        let mut clock = Clock::default();
+        let accel = &*self.accel;
+        let trial = in_pool(settings.threads, || {
+            try_out(scene, accel, settings, registry, control)
+        })??;
+        clock.lap("trial");
+        self.laps.append(&mut clock.laps);
+        Ok(trial)
+    }
+}
+
+fn try_out(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    settings: &RenderSettings,
+    registry: &Registry,
+    control: &Control,
+) -> Result<Trial> {
+    let options = &settings.integrator_settings;
+    let effects = effects::survey(scene, &settings.effects, &registry.effects)?.set;
+    let first = PhotonSettings {
+        seed: options.seed,
+        global: PHOTONS,
+        caustic: PHOTONS,
+        nearest: options.nearest,
+        max_depth: options.max_depth,
+        roulette: options.roulette,
+    };
+    let emission = registry.emissions.choose(settings.emission.as_deref())?;
+    let silent = control.silent();
+    let both = EffectSet::CAUSTICS | EffectSet::INDIRECT;
+    let maps = match effects.contains(EffectSet::CAUSTICS) {
+        true => trace_photons(
+            scene,
+            accel,
+            emission,
+            effects | both,
+            &first,
+            false,
+            &silent,
+        ),
+        false => PhotonMaps::default(),
+    };
+    let flux = |map: &Option<PhotonMap>| -> f64 {
+        let photons = map.iter().flat_map(|m| m.photons());
+        photons.map(|p: &Photon| p.power().luminance()).sum()
+    };
+    let all = flux(&maps.global);
+    let caustics = match all > 0.0 {
+        true => (flux(&maps.caustic) / all).min(1.0),
+        false => 0.0,
+    };
+
+    let adaptive = settings.pixel_sampling == PixelSampling::Adaptive;
+    let interpolated = hindrance(adaptive, settings.interpolation, effects).is_none();
+    let entries = registry.integrators.entries().iter();
+    let mut by_paths = entries.filter(|e| e.photons == PhotonNeeds::None);
+    let Some(paths) = by_paths.next() else {
+        return Ok(Trial {
+            caustics,
+            interpolated,
+            ..Trial::default()
+        });
+    };
+    let all = f64::from(settings.width) * f64::from(settings.height);
+    let wanted = all * f64::from(settings.spp) / SHARE / f64::from(SAMPLES);
+    let scale = (wanted.clamp(PIXELS[0], PIXELS[1]) / all.max(1.0))
+        .sqrt()
+        .min(1.0);
+    let size =
+        [settings.width, settings.height].map(|n| ((f64::from(n) * scale).round() as u32).max(1));
+    let camera = choose_camera(scene, settings, registry)?;
+    let spacing = Spacing::new(size[0], size[1], SAMPLES);
+    let visibility = Visibility::learn(scene, accel, &*camera, &spacing, options.seed);
+    let context = RenderContext {
+        scene,
+        accel,
+        visibility: &visibility,
+        maps: &PhotonMaps::default(),
+        effects,
+        settings: options,
+    };
+    let integrator = (paths.build)(context);
+    let differentials = !scene.textures.is_empty();
+    let noise = noise(
+        &*integrator,
+        &*camera,
+        (&spacing, differentials),
+        options.seed,
+        size,
+        SAMPLES,
+    );
+    Ok(Trial {
+        caustics,
+        noise,
+        interpolated,
+    })
+}
