@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::film::{Component, Film};
 use crate::integrators::{
     IntegratorSettings, PhotonNeeds, PixelPlan, Region, RenderContext, Spacing, Visibility,
-    camera_pass, enclosed, planned_camera_pass,
+    camera_pass, enclosed, keeps, planned_camera_pass,
 };
 use crate::photons::{
     PhotonKey, PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons,
@@ -28,6 +28,7 @@ use crate::photons::{
 use crate::plugins::Registry;
 use crate::sampling::hash2;
 use crate::scene::Scene;
+use crate::stats::tally::{self, Meter, Part};
 use crate::stats::{PhotonCounts, RayCounts, Statistics, peak_memory};
 
 /// How camera samples are shared among pixels.
@@ -175,6 +176,7 @@ fn render_in_pool(
     session: Session<'_>,
 ) -> Result<Rendering> {
     let mut clock = Clock::default();
+    let meter = Meter::new();
     let options = &settings.integrator_settings;
 
     let integrator = registry
@@ -186,7 +188,7 @@ fn render_in_pool(
         .choose(settings.accelerator.as_deref())?;
     let camera = choose_camera(scene, settings, registry)?;
     let region = region(settings)?;
-    let effects = effects::survey(scene, &settings.effects, &registry.effects)?;
+    let mut effects = effects::survey(scene, &settings.effects, &registry.effects)?;
     clock.lap("survey");
 
     let accel = {
@@ -197,7 +199,7 @@ fn render_in_pool(
     clock.lap("build");
 
     if !scene.textures.is_empty() {
-        scene.prepare_textures();
+        tally::stage(Part::Textures, || scene.prepare_textures());
         clock.lap("textures");
     }
 
@@ -383,6 +385,7 @@ fn render_in_pool(
         }
         film.attach(plan_layer(&edges, &film));
     }
+    effects.account(&registry.effects, &meter.finish());
     let built = accel.stats();
     Ok(Rendering {
         statistics: Statistics {
@@ -407,16 +410,8 @@ fn render_in_pool(
 
 /// The components of the image that the effects leave.
 fn components(set: EffectSet) -> Vec<Component> {
-    let bits = |c| match c {
-        Component::Direct => EffectSet::DIRECT,
-        Component::Specular => EffectSet::SPECULAR | EffectSet::REFRACTION,
-        Component::Caustics => EffectSet::CAUSTICS,
-        Component::Indirect => EffectSet::INDIRECT,
-    };
-    Component::ALL
-        .into_iter()
-        .filter(|c| set.intersects(bits(*c)))
-        .collect()
+    let kept = |c: &Component| keeps(set, *c);
+    Component::ALL.into_iter().filter(kept).collect()
 }
 
 /// The name by which a camera is asked for that frames the whole scene.

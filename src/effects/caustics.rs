@@ -1,12 +1,14 @@
 //! Caustics: need a light, something that redirects it, and a diffuse receiver.
 
 use super::{Acts, EffectEntry, EffectSet, Verdict, lights};
+use crate::stats::tally::Part;
 
 /// The table's line.
 pub(super) const ENTRY: EffectEntry = EffectEntry {
     name: "caustics",
     doc: "light focused onto diffuse surfaces by mirrors and glass, from the caustic photon map",
     bit: EffectSet::CAUSTICS,
+    part: Part::Caustics,
     acts: Acts::Traced,
     verdict: |c| {
         if c.specular_objects == 0 {

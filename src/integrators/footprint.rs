@@ -6,6 +6,7 @@ use crate::geometry::{Differential, Footprint, Landing, Ray, SurfacePoint};
 use crate::materials::BsdfSample;
 use crate::math::DVec3;
 use crate::scene::{Crossing, Inside, Scene};
+use crate::stats::tally::{self, Event, Part};
 
 /// Least distance between samples that is told apart, in pixels: what is finer is beyond what
 /// a filter of textures resolves.
@@ -79,9 +80,30 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    /// Carries the differential of `ray` to `sp`, if there is one; it came through `inside`.
+    /// Carries the differential of `ray` to `sp`, if there is one, for textures; it came through
+    /// `inside`.
     #[inline]
     pub(super) fn land(
+        differential: &Option<Differential>,
+        inside: Inside,
+        scene: &Scene,
+        ray: &Ray,
+        sp: &SurfacePoint,
+    ) -> Self {
+        if differential.is_none() {
+            return Self {
+                landing: None,
+                crossing: scene.crossing(inside, sp),
+            };
+        }
+        let _scope = tally::enter(Part::Textures);
+        tally::count(Event::Derivatives);
+        Self::land_to_plan(differential, inside, scene, ray, sp)
+    }
+
+    /// As [`land`](Self::land), but not for textures.
+    #[inline]
+    pub(super) fn land_to_plan(
         differential: &Option<Differential>,
         inside: Inside,
         scene: &Scene,

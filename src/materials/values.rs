@@ -13,6 +13,7 @@ use super::thin_film::ThinFilm;
 use super::{Brushing, Bsdf};
 use super::{Interior, MaterialDesc, MaterialTraits};
 use crate::color::Rgb;
+use crate::stats::tally::Event;
 
 /// Index of refraction of the clear coat (`KHR_materials_clearcoat`).
 const COAT_IOR: f64 = 1.5;
@@ -140,6 +141,13 @@ impl Values {
         let opaque = dielectric - through;
         let layer = self.dielectric_layer();
         let film = self.film();
+        let mut events = 0;
+        if film.is_some() {
+            events |= Event::FilmLobes.bit();
+        }
+        if self.anisotropy > 0.0 {
+            events |= Event::BrushedLobes.bit();
+        }
 
         if opaque > 0.0 {
             let mut base = self.base_color * opaque;
@@ -155,14 +163,15 @@ impl Values {
                 bsdf.push(CoatedLambert::new(staying, cover));
             }
             if self.diffuse_transmission > 0.0 {
-                bsdf.push(DiffuseTransmission::new(
+                let lobe = DiffuseTransmission::new(
                     passing * self.diffuse_transmission_color,
                     self.layer_albedo(&layer, film.as_ref()),
-                ));
+                );
+                bsdf.push_in(lobe, FrameId::MAIN, Event::TranslucentLobes.bit());
             }
         }
         if through > 0.0 {
-            self.interface(through).push(front, bsdf);
+            self.interface(through).push(front, events, bsdf);
         }
         // Metal and dielectric reflect alike: Schlick's term is linear in f0 and f90.
         let schlick = Schlick {
@@ -180,12 +189,13 @@ impl Values {
                 opaque,
             }),
         };
-        bsdf.push(reflection(self.is_smooth(), self.ggx(), fresnel));
+        let lobe = reflection(self.is_smooth(), self.ggx(), fresnel);
+        bsdf.push_in(lobe, FrameId::MAIN, events);
 
         if !self.sheen_color.is_black() {
             let sheen = Sheen::new(self.sheen_color, self.sheen_roughness);
             bsdf.cover(Cover::sheen(&sheen), FrameId::MAIN);
-            bsdf.push(sheen);
+            bsdf.push_in(sheen, FrameId::MAIN, Event::SheenLobes.bit());
         }
         if self.clearcoat > 0.0 {
             let r = f0(COAT_IOR, 1.0);
@@ -198,7 +208,7 @@ impl Values {
             let alpha = self.clearcoat_roughness.max(MaterialDesc::SMOOTH).powi(2);
             let smooth = self.clearcoat_roughness < MaterialDesc::SMOOTH;
             let lobe = reflection(smooth, Ggx::round(alpha), Fresnel::Schlick(fresnel));
-            bsdf.push_in(lobe, coat);
+            bsdf.push_in(lobe, coat, Event::CoatLobes.bit());
         }
     }
 

@@ -264,10 +264,12 @@ impl SceneBuilder {
             material_names.push(name);
         }
         let matte = materials.iter().map(|m| m.matte()).collect();
+        let refracts = materials.iter().map(|m| m.traits().refracts).collect();
         Ok(Scene {
             choose_light: LightChoice::new(&lights),
             geometry: Arc::new(geometry),
             materials,
+            refracts,
             matte,
             material_names,
             material_features: self.features,

@@ -23,8 +23,9 @@ use crate::geometry::{
     Footprint, Geometry, LightId, MaterialId, ObjectId, Ray, ScenePatches, Surface, SurfacePoint,
 };
 use crate::lights::{LiSample, Light, Parallelogram};
-use crate::materials::{Bsdf, Features, Material, Matte, TransportMode};
+use crate::materials::{Bsdf, Features, Interior, Material, Matte, TransportMode};
 use crate::math::{Aabb, BoundingSphere, DVec3};
+use crate::stats::tally::{self, Event, Part};
 use crate::textures::Texture;
 
 /// Everything that is rendered.
@@ -35,6 +36,8 @@ pub struct Scene {
     pub materials: Vec<Box<dyn Material>>,
     /// What each of them has beyond a plain surface.
     pub material_features: Vec<Features>,
+    /// Whether each of them bends the light that it transmits.
+    refracts: Vec<bool>,
     /// Reflectance of those that are [matte](Material::matte).
     pub matte: Vec<Option<Rgb>>,
     /// Names of the materials, for reports.
@@ -79,6 +82,12 @@ impl Scene {
     #[inline]
     pub fn material(&self, id: MaterialId) -> &dyn Material {
         &*self.materials[id.index()]
+    }
+
+    /// Whether a material bends the light that it transmits.
+    #[inline]
+    pub fn bends(&self, id: MaterialId) -> bool {
+        self.refracts[id.index()]
     }
 
     /// The light named `id`.
@@ -242,7 +251,7 @@ impl Scene {
         if let Some(media) = &self.media
             && (media.knows(sp.object) || crossing.beyond(false) != Inside::default())
         {
-            return media.transmittance(crossing, sp);
+            return absorbed(media.interior(crossing)?, sp);
         }
         if sp.front {
             return None;
@@ -253,8 +262,7 @@ impl Scene {
     /// The rare part of the above, kept out of the loops that it is asked from.
     #[inline(never)]
     fn interior_transmittance(&self, sp: &SurfacePoint) -> Option<Rgb> {
-        let interior = self.material(sp.material).interior()?;
-        Some(interior.transmittance(sp.distance))
+        absorbed(self.material(sp.material).interior()?, sp)
     }
 
     /// As [`Geometry::surface_point`].
@@ -262,4 +270,11 @@ impl Scene {
     pub fn surface_point(&self, ray: &Ray, hit: &crate::geometry::Hit) -> SurfacePoint {
         self.geometry.surface_point(ray, hit)
     }
+}
+
+/// What a body leaves of the light on a segment through it.
+fn absorbed(interior: Interior, sp: &SurfacePoint) -> Option<Rgb> {
+    let _scope = tally::enter(Part::Absorption);
+    tally::count(Event::Attenuations);
+    Some(interior.transmittance(sp.distance))
 }

@@ -20,6 +20,7 @@ use super::cover::Cover;
 use super::lobes::{Lambert, Lobe, LobeClass, LobeModel, LobeSample};
 use crate::color::Rgb;
 use crate::math::{DVec3, Frame};
+use crate::stats::tally::{self, Scope};
 
 /// What is transported along a path: radiance (from the camera) or importance (photons). The
 /// factors η² and of shading normals depend on it.
@@ -108,6 +109,16 @@ struct Entry {
     frame: FrameId,
     /// The first of the layers above it.
     under: u8,
+    /// What is [counted](tally::lobe) when it is evaluated or sampled.
+    events: u32,
+}
+
+impl Entry {
+    /// Counts an evaluation, and takes its time until the answer is dropped.
+    #[inline(always)]
+    fn tell(&self) -> Option<Scope> {
+        (self.events != 0).then(|| tally::lobe(self.events))
+    }
 }
 
 /// The scattering function at one point, seen from one direction.
@@ -321,6 +332,7 @@ impl Bsdf {
             if !self.sides_agree(wi, local) {
                 continue;
             }
+            let _scope = e.tell();
             let (f, pdf) = e.lobe.eval(wo, local);
             if f.is_black() {
                 continue;
@@ -360,6 +372,7 @@ impl Bsdf {
                 let view = self.view(e.frame);
                 let local = view.frame.to_local(wi);
                 if self.sides_agree(wi, local) {
+                    let _scope = e.tell();
                     sum += e.lobe.eval(view.wo, local).0 * self.uncovered(e.under, wi);
                 }
             }
@@ -383,6 +396,7 @@ impl Bsdf {
                 return None;
             }
             let view = self.view(e.frame);
+            let _scope = e.tell();
             for s in e.lobe.branches(view.wo) {
                 let wi = view.frame.to_world(s.wi);
                 if !self.sides_agree(wi, s.wi) || s.weight.is_black() {
@@ -445,6 +459,7 @@ impl Bsdf {
             // Within the lobe, what is left of u_lobe is uniform again.
             u_in = (rest / chosen.pick).clamp(0.0, 1.0 - f64::EPSILON);
         }
+        let _scope = chosen.tell();
         let lobe = &chosen.lobe;
         let view = self.view(chosen.frame);
         let scattered = lobe
