@@ -121,9 +121,9 @@ fn effect(d: &Decision) -> String {
     let state = if d.on { "on" } else { "skipped" };
     let mut out = format!("{:<13}{state:<9}", d.name);
     if let Some(cost) = &d.cost {
-        out += &match d.on {
-            true => format!("{:5.1}%  ", 100.0 * cost.time_share),
-            false => " ".repeat(8),
+        out += &match cost.time_share {
+            Some(share) if d.on => format!("{:5.1}%  ", 100.0 * share),
+            _ => " ".repeat(8),
         };
         out += &d.reason;
         let counts = cost.counts.iter().filter(|(_, n)| **n > 0);

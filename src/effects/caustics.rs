@@ -17,10 +17,12 @@ pub(super) const ENTRY: EffectEntry = EffectEntry {
             Verdict::off("nothing emits light")
         } else if c.traits.diffuse == 0.0 {
             Verdict::off("no diffuse surface receives them")
+        } else if c.lit_specular_objects == 0 {
+            Verdict::off("what would redirect light lies beyond the range of every light")
         } else {
             Verdict::on(format!(
                 "{} object(s) redirect light onto diffuse surfaces",
-                c.specular_objects
+                c.lit_specular_objects
             ))
         }
     },

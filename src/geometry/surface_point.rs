@@ -67,9 +67,14 @@ impl SurfacePoint {
         let (o, d) = (ray.origin(), ray.direction());
         let near = Near {
             t: f64::from(hit.t),
-            first: object.coverage.is_none().then_some(f64::from(ray.tmin)),
+            first: (cfg!(dualight_without = "alpha") || object.coverage.is_none())
+                .then_some(f64::from(ray.tmin)),
         };
-        let on = match (&object.placement, shape) {
+        let placement = match cfg!(dualight_without = "instances") {
+            true => &None,
+            false => &object.placement,
+        };
+        let on = match (placement, shape) {
             (None, Shape::Mesh(mesh)) => on_triangle(o, d, &near, hit.prim, mesh),
             (None, Shape::Spheres(set)) => on_sphere(o, d, &near, hit.prim, set),
             (Some(place), _) => {

@@ -73,7 +73,7 @@ impl Pixel<'_> {
         let mut sampler = self.sequence.point(u64::from(number));
         let [jx, jy] = sampler.next_2d();
         let (x, y) = (self.corner[0] + jx, self.corner[1] + jy);
-        let lens = if view.camera.has_lens() {
+        let lens = if !cfg!(dualight_without = "lens") && view.camera.has_lens() {
             tally::count(Event::LensPoints);
             sampler.next_2d()
         } else {

@@ -52,7 +52,7 @@ impl Spacing {
         };
         CameraRay {
             ray: Ray::new(o, d),
-            differential: differential.then(|| {
+            differential: (!cfg!(dualight_without = "textures") && differential).then(|| {
                 let (x, y) = (difference(0.5, 0.0), difference(0.0, 0.5));
                 Differential {
                     origin: [x.0, y.0],
@@ -90,7 +90,7 @@ impl Trail {
         ray: &Ray,
         sp: &SurfacePoint,
     ) -> Self {
-        if differential.is_none() {
+        if cfg!(dualight_without = "textures") || differential.is_none() {
             return Self {
                 landing: None,
                 crossing: scene.crossing(inside, sp),
@@ -146,12 +146,18 @@ impl Trail {
     /// What textures average over.
     #[inline]
     pub(super) fn footprint(&self) -> Option<Footprint> {
+        if cfg!(dualight_without = "textures") {
+            return None;
+        }
         self.landing.map(|l| l.footprint())
     }
 
     /// The differential of the ray that leaves by a sample of the scattering function.
     #[inline]
     pub(super) fn leave(&self, sp: &SurfacePoint, s: &BsdfSample) -> Option<Differential> {
+        if cfg!(dualight_without = "textures") {
+            return None;
+        }
         self.landing.map(|landing| {
             if s.pdf > 0.0 {
                 landing.spread(sp, s.wi, s.pdf)

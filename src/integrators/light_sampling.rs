@@ -81,7 +81,7 @@ impl View {
     /// Radiance that a ray which leaves the scene sees, near and at infinity.
     pub(super) fn escaped(&self, cx: &RenderContext<'_>, ray: &Ray) -> Rgb {
         let mut sum = self.crossed(cx, ray, f64::INFINITY);
-        if cx.scene.infinite().is_empty() {
+        if cfg!(dualight_without = "environment") || cx.scene.infinite().is_empty() {
             return sum;
         }
         let dir = ray.direction().normalize_or_zero();

@@ -55,7 +55,8 @@ impl Interface {
     /// the index depends on the wavelength. `events` are counted when they are evaluated.
     #[inline]
     pub(super) fn push(&self, front: bool, events: u32, bsdf: &mut Bsdf) {
-        if self.dispersion > 0.0 && !self.thin {
+        let disperses = !cfg!(dualight_without = "dispersion") && self.dispersion > 0.0;
+        if disperses && !self.thin {
             tally::count(Event::Dispersions);
             // KHR_materials_dispersion: the indices of red, green and blue.
             let half = (self.ior - 1.0) * 0.025 * self.dispersion;

@@ -122,7 +122,8 @@ impl Values {
             thickness: self.iridescence_thickness,
         };
         let strength = self.iridescence * film.presence();
-        (strength > 0.0).then_some((film, strength))
+        let there = !cfg!(dualight_without = "iridescence") && strength > 0.0;
+        there.then_some((film, strength))
     }
 
     /// The microfacet distribution (`KHR_materials_anisotropy` widens it along the tangent).
@@ -145,7 +146,7 @@ impl Values {
         if film.is_some() {
             events |= Event::FilmLobes.bit();
         }
-        if self.anisotropy > 0.0 {
+        if !cfg!(dualight_without = "anisotropy") && self.anisotropy > 0.0 {
             events |= Event::BrushedLobes.bit();
         }
 
@@ -162,7 +163,7 @@ impl Values {
                 let cover = self.layer_albedo(&layer, film.as_ref());
                 bsdf.push(CoatedLambert::new(staying, cover));
             }
-            if self.diffuse_transmission > 0.0 {
+            if !cfg!(dualight_without = "translucency") && self.diffuse_transmission > 0.0 {
                 let lobe = DiffuseTransmission::new(
                     passing * self.diffuse_transmission_color,
                     self.layer_albedo(&layer, film.as_ref()),
@@ -192,12 +193,12 @@ impl Values {
         let lobe = reflection(self.is_smooth(), self.ggx(), fresnel);
         bsdf.push_in(lobe, FrameId::MAIN, events);
 
-        if !self.sheen_color.is_black() {
+        if !cfg!(dualight_without = "sheen") && !self.sheen_color.is_black() {
             let sheen = Sheen::new(self.sheen_color, self.sheen_roughness);
             bsdf.cover(Cover::sheen(&sheen), FrameId::MAIN);
             bsdf.push_in(sheen, FrameId::MAIN, Event::SheenLobes.bit());
         }
-        if self.clearcoat > 0.0 {
+        if !cfg!(dualight_without = "coat") && self.clearcoat > 0.0 {
             let r = f0(COAT_IOR, 1.0);
             let fresnel = Schlick {
                 f0: Rgb::splat(r * self.clearcoat),

@@ -42,7 +42,8 @@ pub struct Scene {
     pub matte: Vec<Option<Rgb>>,
     /// Names of the materials, for reports.
     pub material_names: Vec<String>,
-    /// The textures of all materials. Without any, nobody needs footprints.
+    /// The textures of all materials that some object uses and that average over what a sample
+    /// sees. Without any, nobody needs footprints.
     pub textures: Vec<Texture>,
     /// Lights, named by [`LightId`].
     pub lights: Vec<Box<dyn Light>>,
@@ -248,6 +249,9 @@ impl Scene {
     /// inside an absorbing body (Beer–Lambert).
     #[inline(always)]
     pub fn transmittance(&self, sp: &SurfacePoint, crossing: &Crossing) -> Option<Rgb> {
+        if cfg!(dualight_without = "absorption") {
+            return None;
+        }
         if let Some(media) = &self.media
             && (media.knows(sp.object) || crossing.beyond(false) != Inside::default())
         {

@@ -94,6 +94,9 @@ parts! {
     Instances = InstanceHits "hits";
 }
 
+/// What is done in passing: to tell its time would take more than it does.
+const UNTIMED: [Part; 3] = [Part::Dispersion, Part::Lens, Part::Instances];
+
 impl Event {
     /// Its bit in a [set of lobes' events](lobe).
     pub const fn bit(self) -> u32 {
@@ -253,8 +256,8 @@ pub struct Tally {
 pub struct Cost {
     /// How often something was done for it, by what was done.
     pub counts: BTreeMap<&'static str, u64>,
-    /// Its share of the time of all threads, as sampled.
-    pub time_share: f64,
+    /// Its share of the time of all threads, as sampled; none if its time is not told apart.
+    pub time_share: Option<f64>,
 }
 
 impl Cost {
@@ -312,7 +315,8 @@ impl Tally {
                 .map(|(event, _, name)| (*name, self.events(*event)))
                 .chain([("rays", rays)])
                 .collect(),
-            time_share: self.micros[part as usize] as f64 / all.max(1) as f64,
+            time_share: (!UNTIMED.contains(&part))
+                .then(|| self.micros[part as usize] as f64 / all.max(1) as f64),
         }
     }
 }
@@ -430,8 +434,12 @@ mod tests {
             meter.finish()
         });
         // Of two threads, one works, the other waits within the stage and after it.
-        let share = |part| tally.cost(part).time_share;
-        let all: f64 = PARTS.iter().map(|p| share(*p)).sum();
+        let share = |part| tally.cost(part).time_share.unwrap_or(f64::NAN);
+        let all: f64 = PARTS
+            .iter()
+            .filter(|p| !UNTIMED.contains(p))
+            .map(|p| share(*p))
+            .sum();
         assert!((all - 1.0).abs() < 1e-9, "{all}");
         for (part, expected) in [
             (Part::Textures, 0.375 * 0.75),

@@ -6,9 +6,11 @@
 //! can partition path space by class.
 
 mod build;
+mod entry;
 mod matte;
 mod scattering;
 
+use entry::Entry;
 pub use matte::Matte;
 pub use scattering::Scattering;
 
@@ -20,7 +22,6 @@ use super::cover::Cover;
 use super::lobes::{Lambert, Lobe, LobeClass, LobeModel, LobeSample};
 use crate::color::Rgb;
 use crate::math::{DVec3, Frame};
-use crate::stats::tally::{self, Scope};
 
 /// What is transported along a path: radiance (from the camera) or importance (photons). The
 /// factors η² and of shading normals depend on it.
@@ -98,27 +99,6 @@ impl FrameId {
 struct View {
     frame: Frame,
     wo: DVec3,
-}
-
-/// A lobe of the stack.
-#[derive(Clone, Debug)]
-struct Entry {
-    lobe: Lobe,
-    /// Its share of the samples, times [`Bsdf::total`].
-    pick: f64,
-    frame: FrameId,
-    /// The first of the layers above it.
-    under: u8,
-    /// What is [counted](tally::lobe) when it is evaluated or sampled.
-    events: u32,
-}
-
-impl Entry {
-    /// Counts an evaluation, and takes its time until the answer is dropped.
-    #[inline(always)]
-    fn tell(&self) -> Option<Scope> {
-        (self.events != 0).then(|| tally::lobe(self.events))
-    }
 }
 
 /// The scattering function at one point, seen from one direction.
