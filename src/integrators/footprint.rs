@@ -82,28 +82,8 @@ pub(super) struct Trail {
 impl Trail {
     /// Carries the differential of `ray` to `sp`, if there is one, for textures; it came through
     /// `inside`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn land(
-        differential: &Option<Differential>,
-        inside: Inside,
-        scene: &Scene,
-        ray: &Ray,
-        sp: &SurfacePoint,
-    ) -> Self {
-        if cfg!(dualight_without = "textures") || differential.is_none() {
-            return Self {
-                landing: None,
-                crossing: scene.crossing(inside, sp),
-            };
-        }
-        let _scope = tally::enter(Part::Textures);
-        tally::count(Event::Derivatives);
-        Self::land_to_plan(differential, inside, scene, ray, sp)
-    }
-
-    /// As [`land`](Self::land), but not for textures.
-    #[inline]
-    pub(super) fn land_to_plan(
         differential: &Option<Differential>,
         inside: Inside,
         scene: &Scene,
@@ -115,10 +95,28 @@ impl Trail {
             crossing: scene.crossing(inside, sp),
         };
         // In place: it is large, and to move nothing of it costs as much as to move it.
-        if let Some(d) = differential {
+        if !cfg!(dualight_without = "textures")
+            && let Some(d) = differential
+        {
+            let _scope = tally::enter(Part::Textures);
+            tally::count(Event::Derivatives);
             trail.landing = d.land(&scene.geometry, ray, sp);
         }
         trail
+    }
+
+    /// As [`land`](Self::land), but not for textures.
+    pub(super) fn land_to_plan(
+        differential: &Differential,
+        inside: Inside,
+        scene: &Scene,
+        ray: &Ray,
+        sp: &SurfacePoint,
+    ) -> Self {
+        Self {
+            landing: differential.land(&scene.geometry, ray, sp),
+            crossing: scene.crossing(inside, sp),
+        }
     }
 
     /// The media that the surface parts.
@@ -153,7 +151,7 @@ impl Trail {
     }
 
     /// The differential of the ray that leaves by a sample of the scattering function.
-    #[inline]
+    #[inline(always)]
     pub(super) fn leave(&self, sp: &SurfacePoint, s: &BsdfSample) -> Option<Differential> {
         if cfg!(dualight_without = "textures") {
             return None;
