@@ -1,5 +1,5 @@
-//! Tells the program its git commit and, with feature `embree`, finds Embree 4 and
-//! builds the C shim of `ffi/`.
+//! Tells the program its git commit, leaves out effects for measurements and, with feature
+//! `embree`, finds Embree 4 and builds the C shim of `ffi/`.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,8 +7,20 @@ use std::process::Command;
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-env=DUALIGHT_GIT_COMMIT={}", git_commit());
+    leave_out();
     #[cfg(feature = "embree")]
     embree::build();
+}
+
+/// Leaves the code of the effects named in `DUALIGHT_WITHOUT` out of the program, so that
+/// scripts/effects_cost.py can count what it costs where there is nothing to do for them.
+fn leave_out() {
+    println!("cargo::rerun-if-env-changed=DUALIGHT_WITHOUT");
+    println!("cargo::rustc-check-cfg=cfg(dualight_without, values(any()))");
+    let names = std::env::var("DUALIGHT_WITHOUT").unwrap_or_default();
+    for name in names.split(',').filter(|name| !name.is_empty()) {
+        println!("cargo::rustc-cfg=dualight_without=\"{name}\"");
+    }
 }
 
 /// The short hash of the commit that is built, "unknown" outside a git checkout.

@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 use crate::film::{Component, Film};
 use crate::integrators::{
     IntegratorSettings, PhotonNeeds, PixelPlan, Region, RenderContext, Spacing, Visibility,
-    camera_pass, enclosed, planned_camera_pass,
+    camera_pass, enclosed, keeps, planned_camera_pass,
 };
 use crate::photons::{
     PhotonKey, PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons,
@@ -30,6 +30,7 @@ use crate::photons::{
 use crate::plugins::Registry;
 use crate::sampling::hash2;
 use crate::scene::Scene;
+use crate::stats::tally::Meter;
 use crate::stats::{PhotonCounts, RayCounts, Statistics, peak_memory};
 
 /// How camera samples are shared among pixels.
@@ -178,6 +179,7 @@ fn render_in_pool(
     session: Session<'_>,
 ) -> Result<Rendering> {
     let mut clock = Clock::default();
+    let meter = Meter::new();
     let options = &settings.integrator_settings;
 
     let integrator = registry
@@ -189,7 +191,7 @@ fn render_in_pool(
         .choose(settings.accelerator.as_deref())?;
     let camera = choose_camera(scene, settings, registry)?;
     let region = region(settings)?;
-    let effects = effects::survey(scene, &settings.effects, &registry.effects)?;
+    let mut effects = effects::survey(scene, &settings.effects, &registry.effects)?;
     clock.lap("survey");
 
     let Prepared { accel, laps } = match session.prepared {
@@ -380,6 +382,7 @@ fn render_in_pool(
         }
         film.attach(plan_layer(&edges, &film));
     }
+    effects.account(&registry.effects, &meter.finish());
     let built = accel.stats();
     Ok(Rendering {
         statistics: Statistics {
@@ -404,16 +407,8 @@ fn render_in_pool(
 
 /// The components of the image that the effects leave.
 fn components(set: EffectSet) -> Vec<Component> {
-    let bits = |c| match c {
-        Component::Direct => EffectSet::DIRECT,
-        Component::Specular => EffectSet::SPECULAR | EffectSet::REFRACTION,
-        Component::Caustics => EffectSet::CAUSTICS,
-        Component::Indirect => EffectSet::INDIRECT,
-    };
-    Component::ALL
-        .into_iter()
-        .filter(|c| set.intersects(bits(*c)))
-        .collect()
+    let kept = |c: &Component| keeps(set, *c);
+    Component::ALL.into_iter().filter(kept).collect()
 }
 
 /// The name by which a camera is asked for that frames the whole scene.

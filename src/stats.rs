@@ -1,5 +1,7 @@
 //! What a run counted and how long its stages took; written as JSON.
 
+pub mod tally;
+
 use serde::{Deserialize, Serialize};
 
 /// Rays traced, by kind.

@@ -85,7 +85,16 @@ fn images_and_statistics_are_written() {
     assert_eq!(json["settings"]["integrator"], "photon");
     assert_eq!(json["stopped"], serde_json::Value::Null);
     assert!(json["statistics"]["rays"]["camera"].as_u64().unwrap() >= 24 * 16 * 2);
-    assert!(json["effects"].as_array().unwrap().len() > 2);
+    let effects = json["effects"].as_array().unwrap();
+    let of = |name: &str| effects.iter().find(|e| e["name"] == name).unwrap();
+    assert!(of("direct")["counts"]["rays"].as_u64().unwrap() > 0);
+    assert_eq!(of("alpha")["counts"]["filter calls"], 0);
+    // Not timed apart.
+    assert_eq!(of("lens")["time_share"], serde_json::Value::Null);
+    let shares = effects.iter().filter_map(|e| e["time_share"].as_f64());
+    let shares: Vec<f64> = shares.collect();
+    assert!(shares.len() > 10 && shares.iter().all(|s| (0.0..=1.0).contains(s)));
+    assert!(shares.iter().sum::<f64>() <= 1.0 + 1e-9);
 }
 
 #[test]

@@ -6,12 +6,14 @@ mod common;
 
 use std::sync::Arc;
 
-use common::render::{GATHER, PATH, Size, mean, rendering, settings};
-use common::{add_room, camera, lambert, lamp, light};
+use common::render::{GATHER, Mode, PATH, Size, mean, rendering, settings};
+use common::show::{self, Show};
+use common::{add_room, add_sphere, camera, glass, lambert, lamp, light, square};
 use dualight::cameras::{CameraDesc, Lens};
 use dualight::color::Rgb;
-use dualight::effects::{Acts, EFFECTS, omissions, survey};
+use dualight::effects::{Acts, EFFECTS, EffectSet, omissions, survey};
 use dualight::geometry::{MaterialId, Ray, TriangleMesh};
+use dualight::lights::LightDesc;
 use dualight::materials::{AlphaMode, MaterialDesc, TextureSlots, TransportMode};
 use dualight::math::{DAffine3, DVec3};
 use dualight::plugins::Registry;
@@ -39,6 +41,11 @@ fn texture(rng: &mut Rng, content: Content) -> Option<Texture> {
 /// A glTF material of which everything may be on or off, by factor and by texture.
 fn material(rng: &mut Rng) -> MaterialDesc {
     let toss = |rng: &mut Rng| f64::from(u8::from(rng.next_1d() < 0.5));
+    let rarely = |rng: &mut Rng| f64::from(u8::from(rng.next_1d() < 0.25));
+    let rare = |rng: &mut Rng, content| match rng.next_1d() < 0.25 {
+        true => texture(rng, content),
+        false => None,
+    };
     let slots = TextureSlots {
         base_color: texture(rng, Content::Color),
         metallic_roughness: texture(rng, Content::Data),
@@ -46,6 +53,13 @@ fn material(rng: &mut Rng) -> MaterialDesc {
         specular: texture(rng, Content::Data),
         clearcoat: texture(rng, Content::Data),
         sheen_color: texture(rng, Content::Color),
+        normal: rare(rng, Content::Data),
+        normal_scale: toss(rng),
+        clearcoat_normal: rare(rng, Content::Data),
+        clearcoat_normal_scale: 0.5,
+        iridescence: rare(rng, Content::Data),
+        anisotropy: rare(rng, Content::Data),
+        diffuse_transmission: rare(rng, Content::Data),
         ..Default::default()
     };
     MaterialDesc {
@@ -58,6 +72,16 @@ fn material(rng: &mut Rng) -> MaterialDesc {
         specular: toss(rng),
         clearcoat: toss(rng),
         sheen_color: Rgb::splat(0.5 * toss(rng)),
+        attenuation_distance: if rng.next_1d() < 0.5 {
+            0.7
+        } else {
+            f64::INFINITY
+        },
+        attenuation_color: Rgb::new(1.0, 1.0 - 0.5 * toss(rng), 1.0),
+        dispersion: 3.0 * rarely(rng),
+        diffuse_transmission: 0.6 * rarely(rng),
+        iridescence: rarely(rng),
+        anisotropy: 0.8 * rarely(rng),
         textures: Some(Arc::new(slots)),
         ..Default::default()
     }
@@ -83,16 +107,50 @@ fn add_square(b: &mut SceneBuilder, material: MaterialId, c: DVec3) {
     });
 }
 
-fn scene(rng: &mut Rng) -> Scene {
+/// Alpha, now and then: too little of it to be seen, or a half.
+fn with_alpha(rng: &mut Rng, mut d: MaterialDesc) -> MaterialDesc {
+    d.alpha_mode = match rng.next_u64() % 6 {
+        0 => AlphaMode::Blend,
+        1 => AlphaMode::Mask { cutoff: 0.5 },
+        _ => AlphaMode::Opaque,
+    };
+    d.base_alpha = if rng.next_1d() < 0.5 { 1.0 } else { 0.6 };
+    d
+}
+
+/// A room in which everything may be there or not, without what `omit` says.
+fn scene(seed: u64, omit: Omit) -> Scene {
+    let rng = &mut Rng::new(seed);
     let mut b = SceneBuilder::default();
+    b.leave_out(omit);
     let walls = match rng.next_u64() % 3 {
         0 => b.add_material(&material(rng)),
         1 => b.add_material(&lambert("black", Rgb::ZERO)),
         _ => b.add_material(&lambert("grey", Rgb::splat(0.5))),
     };
-    let (walls, other) = (walls.unwrap(), b.add_material(&material(rng)).unwrap());
-    add_room(&mut b, walls, 3.0);
+    let other = material(rng);
+    let other = with_alpha(rng, other);
+    let (walls, other) = (walls.unwrap(), b.add_material(&other).unwrap());
+    if rng.next_1d() < 0.7 {
+        add_room(&mut b, walls, 3.0);
+    } else {
+        add_square(&mut b, walls, DVec3::new(0.5, 0.5, -2.0));
+    }
     add_square(&mut b, other, DVec3::new(0.0, 0.0, -1.0));
+    if rng.next_1d() < 0.5 {
+        add_sphere(&mut b, "ball", other, DVec3::new(-0.8, -0.5, 0.0), 0.7);
+    }
+    if rng.next_1d() < 0.3 {
+        let shape = b.add_mesh(square(), "twice");
+        for x in [-1.5, 1.5] {
+            b.place(MeshPlacement {
+                shape,
+                material: other,
+                world_from_object: DAffine3::from_translation(DVec3::new(x, 0.5, -1.5)),
+                name: "twice".into(),
+            });
+        }
+    }
     if rng.next_1d() < 0.5 {
         b.add_light(light("point", DVec3::new(0.5, 1.0, 1.0), DVec3::Y, 3.0));
     }
@@ -100,7 +158,20 @@ fn scene(rng: &mut Rng) -> Scene {
         let glowing = b.add_material(&lamp(Rgb::splat(2.0))).unwrap();
         add_square(&mut b, glowing, DVec3::new(1.5, 1.5, -2.0));
     }
-    b.add_camera(camera(DVec3::new(0.0, 0.0, 2.5), 60.0));
+    if rng.next_1d() < 0.3 {
+        b.add_light(light("environment", DVec3::ZERO, DVec3::Y, 0.5));
+    }
+    let lens = (rng.next_1d() < 0.4).then_some(Lens {
+        radius: if rng.next_1d() < 0.5 { 0.1 } else { 0.0 },
+        focus: 2.0,
+        blades: 0,
+        rotation: 0.0,
+        ratio: 1.0,
+    });
+    b.add_camera(CameraDesc {
+        lens,
+        ..camera(DVec3::new(0.0, 0.0, 2.5), 60.0)
+    });
     b.finish().unwrap()
 }
 
@@ -141,39 +212,192 @@ fn traits_promise_all_that_a_material_does() {
     assert!(seen.iter().all(|n| *n > 500), "{seen:?}");
 }
 
-#[test]
-fn no_scene_loses_light_to_the_survey() {
-    let mut rng = Rng::new(5);
-    let registry = Registry::builtin();
-    let mut skipped = vec![0; EFFECTS.len()];
-    for round in 0..60 {
-        let scene = scene(&mut rng);
-        for (n, d) in skipped
-            .iter_mut()
-            .zip(survey(&scene, "auto", &registry.effects).unwrap().decisions)
-        {
-            *n += usize::from(!d.on);
-        }
-        let size = Size {
+/// How a picture is made, and of what size.
+const WAYS: [(Mode, Size); 2] = [
+    (
+        PATH,
+        Size {
             pixels: 12,
             spp: 8,
             photons: 10,
-        };
-        let picture = |effects: &str| {
-            let mut s = settings(PATH, size, round);
-            s.effects = effects.into();
-            rendering(&scene, &s).film.develop().rgb("").unwrap()
-        };
-        // Path tracing follows the same paths, and what was dropped would be missing in the sum.
-        assert_eq!(picture("auto"), picture("all"), "round {round}");
+        },
+    ),
+    (
+        GATHER,
+        Size {
+            pixels: 12,
+            spp: 4,
+            photons: 1000,
+        },
+    ),
+];
+
+fn picture(scene: &Scene, mode: Mode, size: Size, seed: u64, effects: &str) -> Vec<[f32; 3]> {
+    let mut s = settings(mode, size, seed);
+    s.effects = effects.into();
+    let image = rendering(scene, &s).film.develop();
+    image.rgb("").unwrap().to_vec()
+}
+
+/// Whatever the survey skips can be forced, or left out when the scene is built, and every bit of
+/// the picture stays: nothing of it was needed.
+#[test]
+fn no_scene_loses_light_to_the_survey() {
+    let registry = Registry::builtin();
+    let table = &registry.effects;
+    let (mut skipped, mut needed) = (vec![0; EFFECTS.len()], vec![0; EFFECTS.len()]);
+    for round in 0..120 {
+        let whole = scene(round, Omit::default());
+        let decisions = survey(&whole, "auto", table).unwrap().decisions;
+        let (mut rest, mut kept) = (String::from("auto"), Vec::new());
+        for (i, (e, d)) in EFFECTS.iter().zip(&decisions).enumerate() {
+            skipped[i] += usize::from(!d.on);
+            match (e.acts, d.on) {
+                (Acts::Built(_), false) => rest += &format!(",-{}", e.name),
+                (Acts::Always, _) | (_, false) => {}
+                (_, true) => kept.push(i),
+            }
+        }
+        let lean = scene(round, omissions(&rest, table).unwrap());
+        for (mode, size) in WAYS {
+            let what = format!("round {round} by {}", mode.name);
+            let auto = picture(&whole, mode, size, round, "auto");
+            // What was dropped would be missing.
+            assert!(auto == picture(&whole, mode, size, round, "all"), "{what}");
+            let lean = picture(&lean, mode, size, round, "auto");
+            assert!(auto == lean, "{what}: {rest}");
+            // And what is kept is not kept for nothing, in one scene or another: one of them is
+            // left out in turn.
+            if let Some(&i) = kept.iter().min_by_key(|i| needed[**i]) {
+                let wish = format!("-{}", EFFECTS[i].name);
+                let without = scene(round, omissions(&wish, table).unwrap());
+                let without = picture(&without, mode, size, round, &wish);
+                needed[i] += usize::from(without != auto);
+            }
+        }
     }
-    println!("scenes without each effect: {skipped:?}");
-    // Of those that are decided while light is traced, each is dropped now and then.
-    let mut traced = EFFECTS.iter().zip(&skipped);
-    assert!(
-        traced.all(|(e, n)| *n > 0 || !matches!(e.acts, Acts::Traced)),
-        "{skipped:?}"
-    );
+    let told = |n: &[usize]| -> Vec<String> {
+        let each = EFFECTS.iter().zip(n);
+        each.map(|(e, n)| format!("{} {n}", e.name)).collect()
+    };
+    println!("scenes without each effect: {:?}", told(&skipped));
+    println!("pictures that miss it: {:?}", told(&needed));
+    assert!(skipped.iter().all(|n| *n > 0), "{:?}", told(&skipped));
+    let mut each = EFFECTS.iter().zip(&needed);
+    let all = each.all(|(e, n)| *n > 0 || matches!(e.acts, Acts::Always));
+    assert!(all, "{:?}", told(&needed));
+}
+
+/// Of the effects that are decided when a scene is built, each at zero strength, with all that
+/// belongs to it, is skipped, and the picture is that of a scene without it; at full strength it
+/// is kept, and leaving it out gives that picture again, which is another one.
+#[test]
+fn what_has_no_strength_is_skipped_and_what_has_is_needed() {
+    let table = Registry::builtin().effects;
+    for show in Show::ALL {
+        let Some(name) = show.built() else { continue };
+        let wish = format!("-{name}");
+        let [none, faint, full] =
+            [None, Some(0.0), Some(1.0)].map(|x| show::scene(*show, x, Omit::default()));
+        let left_out = show::scene(*show, 1.0, omissions(&wish, &table).unwrap());
+        let on = |scene: &Scene| -> Vec<&str> {
+            let decisions = survey(scene, "auto", &table).unwrap().decisions;
+            decisions.iter().filter(|d| d.on).map(|d| d.name).collect()
+        };
+        assert!(on(&full).contains(&name), "{name} at full strength");
+        assert_eq!(on(&faint), on(&none), "{name} at no strength");
+        for (mode, size) in WAYS {
+            let what = format!("{name} by {}", mode.name);
+            let see = |scene: &Scene| picture(scene, mode, size, 2, "auto");
+            let (without, full) = (see(&none), see(&full));
+            assert!(see(&faint) == without, "{what}: no strength");
+            let left_out = picture(&left_out, mode, size, 2, &wish);
+            assert!(left_out != full, "{what}: is not needed");
+            // Of textures, the factor remains.
+            assert!(left_out == without || name == "textures", "{what}: {wish}");
+        }
+    }
+}
+
+/// Footprints are for textures that are averaged over them, and for nothing else.
+#[test]
+fn rays_carry_differentials_only_for_what_asks_for_them() {
+    let image = |content| show::noise(1, content, [[0; 4], [255; 4]]);
+    let slots = |base_color, emissive| {
+        Some(Arc::new(TextureSlots {
+            base_color,
+            emissive,
+            ..Default::default()
+        }))
+    };
+    let cut_out = MaterialDesc {
+        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+        textures: slots(image(Content::Color), None),
+        ..lambert("cut out", Rgb::ZERO)
+    };
+    let painted = MaterialDesc {
+        textures: slots(image(Content::Color), None),
+        ..lambert("painted", Rgb::ONE)
+    };
+    let dark = MaterialDesc {
+        textures: slots(None, image(Content::Color)),
+        ..lambert("its light is off", Rgb::ONE)
+    };
+    let glowing = MaterialDesc {
+        emission: Rgb::ONE,
+        ..dark.clone()
+    };
+    for (shown, used, expected) in [
+        (&cut_out, true, false),
+        (&painted, true, true),
+        (&painted, false, false),
+        (&dark, true, false),
+        // It is seen, and averaged as paint is.
+        (&glowing, true, true),
+    ] {
+        let mut b = SceneBuilder::default();
+        let grey = b.add_material(&lambert("grey", Rgb::splat(0.5))).unwrap();
+        let shown_id = b.add_material(shown).unwrap();
+        add_square(&mut b, if used { shown_id } else { grey }, DVec3::ZERO);
+        b.add_light(light("point", DVec3::new(0.5, 1.0, 1.0), DVec3::Y, 3.0));
+        b.add_camera(camera(DVec3::new(0.0, 0.0, 2.5), 60.0));
+        let scene = b.finish().unwrap();
+        for (mode, size) in WAYS {
+            let done = rendering(&scene, &settings(mode, size, 1));
+            let textures = done.effects.iter().find(|d| d.name == "textures").unwrap();
+            let counts = &textures.cost.as_ref().unwrap().counts;
+            let found = counts["hits with derivatives"] > 0;
+            assert_eq!(found, expected, "{}, used: {used}", shown.name);
+        }
+    }
+}
+
+/// A lamp throws no caustics by glass that is out of its range, and nothing is missed of them.
+#[test]
+fn caustics_need_a_light_that_reaches_what_throws_them() {
+    let registry = Registry::builtin();
+    let scene = |range: f64| {
+        let mut b = SceneBuilder::default();
+        let grey = b.add_material(&lambert("grey", Rgb::splat(0.5))).unwrap();
+        let glass = b.add_material(&glass(1.5)).unwrap();
+        add_room(&mut b, grey, 3.0);
+        add_sphere(&mut b, "ball", glass, DVec3::new(0.0, -0.5, 0.0), 0.5);
+        b.add_light(LightDesc {
+            range,
+            ..light("point", DVec3::new(0.0, 2.0, 0.0), DVec3::Y, 3.0)
+        });
+        b.add_camera(camera(DVec3::new(0.0, 0.0, 2.5), 60.0));
+        b.finish().unwrap()
+    };
+    // Two metres lie between them.
+    for (range, on) in [(1.9, false), (2.1, true), (f64::INFINITY, true)] {
+        let scene = scene(range);
+        let set = survey(&scene, "auto", &registry.effects).unwrap().set;
+        assert_eq!(set.contains(EffectSet::CAUSTICS), on, "{range}");
+        let (_, size) = WAYS[0];
+        let auto = picture(&scene, PATH, size, 1, "auto");
+        assert!(auto == picture(&scene, PATH, size, 1, "all"), "{range}");
+    }
 }
 
 /// Each of the two parts of what is seen in glass can be left out, by both integrators alike, and
@@ -225,6 +449,7 @@ fn everything(omit: Omit) -> Scene {
     let textures = TextureSlots {
         base_color: white(),
         normal: white(),
+        normal_scale: 1.0,
         ..Default::default()
     };
     let all = MaterialDesc {
@@ -235,6 +460,7 @@ fn everything(omit: Omit) -> Scene {
         transmission: 0.5,
         volume: true,
         attenuation_distance: 1.0,
+        attenuation_color: Rgb::splat(0.5),
         dispersion: 1.0,
         clearcoat: 1.0,
         sheen_color: Rgb::ONE,

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::format::{bytes, count};
 use crate::control::Stopped;
+use crate::effects::Decision;
 use crate::output::Metadata;
 use crate::pipeline::{PixelSampling, RenderSettings, Rendering};
 use crate::stats::PhotonCounts;
@@ -92,8 +93,7 @@ pub(super) fn table(s: &Summary) -> String {
         ),
     ));
     for d in &s.rendering.effects {
-        let state = if d.on { "on" } else { "skipped" };
-        rows.push(("effect", format!("{:<13}{state:<9}{}", d.name, d.reason)));
+        rows.push(("effect", effect(d)));
     }
     if statistics.rejected_pixels > 0 {
         let n = statistics.rejected_pixels;
@@ -112,6 +112,29 @@ pub(super) fn table(s: &Summary) -> String {
     for (name, value) in rows {
         // Writing to a string does not fail.
         let _ = writeln!(out, "{name:>12}  {value}");
+    }
+    out
+}
+
+/// What was decided on an effect and why, its share of the time, and what was done for it.
+fn effect(d: &Decision) -> String {
+    let state = if d.on { "on" } else { "skipped" };
+    let mut out = format!("{:<13}{state:<9}", d.name);
+    if let Some(cost) = &d.cost {
+        out += &match cost.time_share {
+            Some(share) if d.on => format!("{:5.1}%  ", 100.0 * share),
+            _ => " ".repeat(8),
+        };
+        out += &d.reason;
+        let counts = cost.counts.iter().filter(|(_, n)| **n > 0);
+        let counts: Vec<String> = counts
+            .map(|(what, n)| format!("{} {what}", count(*n as f64)))
+            .collect();
+        if !counts.is_empty() {
+            out += &format!(" ({})", counts.join(", "));
+        }
+    } else {
+        out += &d.reason;
     }
     out
 }

@@ -31,6 +31,7 @@ use crate::geometry::SurfacePoint;
 use crate::materials::{Features, LobeClass};
 use crate::registry::Table;
 use crate::scene::{Census, Omit, Scene};
+use crate::stats::tally::{self, Cost, Event, Part, Tally};
 
 bitflags! {
     /// A set of effects.
@@ -80,7 +81,7 @@ impl EffectSet {
     /// [`REFRACTION`](Self::REFRACTION), what is neither that nor diffuse
     /// [`SPECULAR`](Self::SPECULAR).
     #[inline]
-    pub fn follow(
+    pub fn allows(
         self,
         scene: &Scene,
         sp: &SurfacePoint,
@@ -91,12 +92,44 @@ impl EffectSet {
         if class == LobeClass::Diffuse || self.contains(both) {
             return true;
         }
-        let bent = transmitted && scene.material(sp.material).traits().refracts;
-        self.contains(if bent {
-            Self::REFRACTION
-        } else {
-            Self::SPECULAR
+        self.contains(match specular_part(scene, sp, transmitted) {
+            Part::Refraction => Self::REFRACTION,
+            _ => Self::SPECULAR,
         })
+    }
+
+    /// As [`allows`](Self::allows), and counts what is followed unless it is diffuse: the part
+    /// that it belongs to, or none.
+    #[inline]
+    pub fn follow(
+        self,
+        scene: &Scene,
+        sp: &SurfacePoint,
+        class: LobeClass,
+        transmitted: bool,
+    ) -> Option<Part> {
+        if class == LobeClass::Diffuse {
+            return Some(Part::Indirect);
+        }
+        let part = specular_part(scene, sp, transmitted);
+        let (needs, event) = match part {
+            Part::Refraction => (Self::REFRACTION, Event::Refractions),
+            _ => (Self::SPECULAR, Event::Reflections),
+        };
+        self.contains(needs).then(|| {
+            tally::count(event);
+            part
+        })
+    }
+}
+
+/// What a scattering that is not diffuse is part of.
+#[inline]
+pub fn specular_part(scene: &Scene, sp: &SurfacePoint, transmitted: bool) -> Part {
+    if transmitted && scene.bends(sp.material) {
+        Part::Refraction
+    } else {
+        Part::Specular
     }
 }
 
@@ -126,7 +159,7 @@ impl Verdict {
 }
 
 /// A decision of the survey, or of the user.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Decision {
     /// Name of the effect.
     pub name: &'static str,
@@ -134,6 +167,9 @@ pub struct Decision {
     pub on: bool,
     /// Why, or why not.
     pub reason: String,
+    /// What it took, once that is known.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<Cost>,
 }
 
 /// When it is decided whether an effect is simulated.
@@ -156,6 +192,8 @@ pub struct EffectEntry {
     pub doc: &'static str,
     /// Its bit.
     pub bit: EffectSet,
+    /// What its work is counted and timed as.
+    pub part: Part,
     /// What switches it.
     pub acts: Acts,
     /// Decides from what the scene holds.
@@ -187,12 +225,21 @@ pub static EFFECTS: &[EffectEntry] = &[
 ];
 
 /// What the survey found.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Effects {
     /// The effects that are simulated.
     pub set: EffectSet,
     /// Every effect with its reason.
     pub decisions: Vec<Decision>,
+}
+
+impl Effects {
+    /// Tells what each took; `table` is the one that they were surveyed by.
+    pub fn account(&mut self, table: &Table<EffectEntry>, tally: &Tally) {
+        for (decision, entry) in self.decisions.iter_mut().zip(table.entries()) {
+            decision.cost = Some(tally.cost(entry.part));
+        }
+    }
 }
 
 /// What the user asked for.
@@ -279,6 +326,7 @@ pub fn survey(scene: &Scene, wish: &str, table: &Table<EffectEntry>) -> Result<E
             name: e.name,
             on: verdict.on,
             reason: verdict.reason,
+            cost: None,
         });
     }
     Ok(Effects { set, decisions })

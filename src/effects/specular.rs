@@ -1,12 +1,14 @@
 //! Mirror-like and glossy reflection.
 
 use super::{Acts, EffectEntry, EffectSet, Verdict};
+use crate::stats::tally::Part;
 
 /// The table's line.
 pub(super) const ENTRY: EffectEntry = EffectEntry {
     name: "specular",
     doc: "what is seen in mirrors, in glossy surfaces and through glass",
     bit: EffectSet::SPECULAR,
+    part: Part::Specular,
     acts: Acts::Traced,
     verdict: |c| {
         if c.specular_objects == 0 {

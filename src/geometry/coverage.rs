@@ -5,6 +5,7 @@
 //! and primitive, so that all backends decide alike, however often they ask.
 
 use super::{Ray, Shape};
+use crate::stats::tally::{self, Event, Part};
 
 /// Says how much of a surface is there.
 pub trait Coverage: Send + Sync {
@@ -51,6 +52,8 @@ pub struct CoverageQuery {
 impl CoverageQuery {
     /// Whether the hit counts.
     pub fn stops(&self, coverage: &dyn Coverage, shape: &Shape) -> bool {
+        let _scope = tally::enter(Part::Alpha);
+        tally::count(Event::FilterCalls);
         let opacity = coverage.opacity(shape, self.prim, self.barycentrics);
         if opacity <= 0.0 {
             return false;

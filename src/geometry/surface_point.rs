@@ -4,6 +4,7 @@ use super::object::Placement;
 use super::{Hit, Object, Ray, Shape, SphereSet, TriangleMesh, sphere, triangle};
 use crate::ad::V3;
 use crate::math::{DVec3, larger, max_abs, nearly_unit, robust};
+use crate::stats::tally::{self, Event};
 
 macro_rules! id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -66,12 +67,20 @@ impl SurfacePoint {
         let (o, d) = (ray.origin(), ray.direction());
         let near = Near {
             t: f64::from(hit.t),
-            first: object.coverage.is_none().then_some(f64::from(ray.tmin)),
+            first: (cfg!(dualight_without = "alpha") || object.coverage.is_none())
+                .then_some(f64::from(ray.tmin)),
         };
-        let on = match (&object.placement, shape) {
+        let placement = match cfg!(dualight_without = "instances") {
+            true => &None,
+            false => &object.placement,
+        };
+        let on = match (placement, shape) {
             (None, Shape::Mesh(mesh)) => on_triangle(o, d, &near, hit.prim, mesh),
             (None, Shape::Spheres(set)) => on_sphere(o, d, &near, hit.prim, set),
-            (Some(place), _) => on_placed(o, d, &near, hit.prim, shape, place),
+            (Some(place), _) => {
+                tally::count(Event::InstanceHits);
+                on_placed(o, d, &near, hit.prim, shape, place)
+            }
         };
         let (unit, length) = nearly_unit(d);
         let wo = -unit;

@@ -15,6 +15,7 @@ use crate::control::Control;
 use crate::film::{Film, PixelSample, Tile};
 use crate::sampling::{Sequence, stream};
 use crate::stats::RayCounts;
+use crate::stats::tally::{self, Event};
 
 /// Edge of a tile in pixels.
 const TILE: u32 = 16;
@@ -72,7 +73,8 @@ impl Pixel<'_> {
         let mut sampler = self.sequence.point(u64::from(number));
         let [jx, jy] = sampler.next_2d();
         let (x, y) = (self.corner[0] + jx, self.corner[1] + jy);
-        let lens = if view.camera.has_lens() {
+        let lens = if !cfg!(dualight_without = "lens") && view.camera.has_lens() {
+            tally::count(Event::LensPoints);
             sampler.next_2d()
         } else {
             [0.5; 2]

@@ -6,6 +6,7 @@ use crate::geometry::{Differential, Footprint, Landing, Ray, SurfacePoint};
 use crate::materials::BsdfSample;
 use crate::math::DVec3;
 use crate::scene::{Crossing, Inside, Scene};
+use crate::stats::tally::{self, Event, Part};
 
 /// Least distance between samples that is told apart, in pixels: what is finer is beyond what
 /// a filter of textures resolves.
@@ -51,7 +52,7 @@ impl Spacing {
         };
         CameraRay {
             ray: Ray::new(o, d),
-            differential: differential.then(|| {
+            differential: (!cfg!(dualight_without = "textures") && differential).then(|| {
                 let (x, y) = (difference(0.5, 0.0), difference(0.0, 0.5));
                 Differential {
                     origin: [x.0, y.0],
@@ -79,8 +80,9 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    /// Carries the differential of `ray` to `sp`, if there is one; it came through `inside`.
-    #[inline]
+    /// Carries the differential of `ray` to `sp`, if there is one, for textures; it came through
+    /// `inside`.
+    #[inline(always)]
     pub(super) fn land(
         differential: &Option<Differential>,
         inside: Inside,
@@ -93,10 +95,28 @@ impl Trail {
             crossing: scene.crossing(inside, sp),
         };
         // In place: it is large, and to move nothing of it costs as much as to move it.
-        if let Some(d) = differential {
+        if !cfg!(dualight_without = "textures")
+            && let Some(d) = differential
+        {
+            let _scope = tally::enter(Part::Textures);
+            tally::count(Event::Derivatives);
             trail.landing = d.land(&scene.geometry, ray, sp);
         }
         trail
+    }
+
+    /// As [`land`](Self::land), but not for textures.
+    pub(super) fn land_to_plan(
+        differential: &Differential,
+        inside: Inside,
+        scene: &Scene,
+        ray: &Ray,
+        sp: &SurfacePoint,
+    ) -> Self {
+        Self {
+            landing: differential.land(&scene.geometry, ray, sp),
+            crossing: scene.crossing(inside, sp),
+        }
     }
 
     /// The media that the surface parts.
@@ -124,12 +144,18 @@ impl Trail {
     /// What textures average over.
     #[inline]
     pub(super) fn footprint(&self) -> Option<Footprint> {
+        if cfg!(dualight_without = "textures") {
+            return None;
+        }
         self.landing.map(|l| l.footprint())
     }
 
     /// The differential of the ray that leaves by a sample of the scattering function.
-    #[inline]
+    #[inline(always)]
     pub(super) fn leave(&self, sp: &SurfacePoint, s: &BsdfSample) -> Option<Differential> {
+        if cfg!(dualight_without = "textures") {
+            return None;
+        }
         self.landing.map(|landing| {
             if s.pdf > 0.0 {
                 landing.spread(sp, s.wi, s.pdf)

@@ -14,6 +14,7 @@ use crate::geometry::{Footprint, Ray, SurfacePoint};
 use crate::materials::{Bsdf, Scattering, TransportMode};
 use crate::photons::PhotonClass;
 use crate::sampling::Sampler;
+use crate::stats::tally::{self, Event, Part};
 
 /// A gather ray shorter than this many kernel radii sees the kernel itself, as splotches in
 /// corners: there the path is followed one surface further instead.
@@ -83,11 +84,13 @@ impl PhotonMapping<'_> {
         } else {
             0
         };
+        let mut scope = tally::enter(Part::Direct);
         for _ in 0..n_shadow {
             let u = sampler.next_2d();
             let sampled = sample_direct(cx, sp, bsdf, u, f64::from(n_shadow), n_gather);
             if let Some(direct) = sampled {
                 scratch.rays.shadow += 1;
+                tally::ray(Part::Direct);
                 if !cx.accel.occluded(&direct.ray) {
                     light.direct += direct.value.diffuse;
                 }
@@ -98,7 +101,9 @@ impl PhotonMapping<'_> {
         let stored = Stored::new(cx);
         let sites = sites(sp, bsdf);
         if let Some(map) = &cx.maps.caustic {
-            let e = stored.density(map, &sites, bsdf, |_| true, scratch);
+            scope.switch(Part::Caustics);
+            let lookup = Event::CausticLookups;
+            let e = stored.density(map, &sites, bsdf, |_| true, lookup, scratch);
             light.caustics += e.value;
             if let Some(d) = &mut densities {
                 d[1] += e.density;
@@ -106,6 +111,7 @@ impl PhotonMapping<'_> {
         }
 
         // The global map: seen by gather rays, or directly.
+        scope.switch(Part::Indirect);
         if let Some(d) = &mut densities
             && let Some(s) = stored.irradiance(&sites[0])
         {
@@ -114,7 +120,8 @@ impl PhotonMapping<'_> {
         if gather_rays == 0 {
             if let Some(map) = &cx.maps.global {
                 let keep = |class| class == PhotonClass::Indirect;
-                let e = stored.density(map, &sites, bsdf, keep, scratch);
+                let lookup = Event::GlobalLookups;
+                let e = stored.density(map, &sites, bsdf, keep, lookup, scratch);
                 light.indirect += e.value;
                 if let Some(d) = &mut densities {
                     d[0] += e.density;
@@ -131,6 +138,7 @@ impl PhotonMapping<'_> {
             };
             let start = trail.start(sp, &s);
             scratch.rays.gather += 1;
+            tally::ray(Part::Indirect);
             let shadow = f64::from(n_shadow);
             let mut seen = Rgb::ZERO;
             let view = View {
@@ -217,7 +225,8 @@ impl PhotonMapping<'_> {
             let Some(s) = bsdf.sample(sampler.next_1d(), sampler.next_2d()) else {
                 return Rgb::ZERO;
             };
-            if !cx.effects.follow(cx.scene, &sp, s.class, s.transmitted) {
+            let follows = cx.effects.follow(cx.scene, &sp, s.class, s.transmitted);
+            if follows.is_none() {
                 return Rgb::ZERO;
             }
             beta *= s.weight;
@@ -235,6 +244,7 @@ impl PhotonMapping<'_> {
             differential = trail.leave(&sp, &s);
             inside = trail.beyond(&s);
             scratch.rays.gather += 1;
+            tally::ray(Part::Indirect);
         }
         Rgb::ZERO
     }
@@ -265,6 +275,7 @@ impl PhotonMapping<'_> {
         let mut sum = stored.glow(&sites, bsdf);
         if let Some(direct) = sample_direct(cx, sp, bsdf, sampler.next_2d(), 1.0, 0.0) {
             scratch.rays.shadow += 1;
+            tally::ray(Part::Indirect);
             if !cx.accel.occluded(&direct.ray) {
                 sum += direct.value.diffuse;
             }
@@ -273,6 +284,7 @@ impl PhotonMapping<'_> {
         if let Some(s) = bsdf.sample(sampler.next_1d(), u) {
             let start = trail.start(sp, &s);
             scratch.rays.gather += 1;
+            tally::ray(Part::Indirect);
             sum += self.gather(start, s.weight, sampler, scratch, steps + 1, |_, _| ());
         }
         sum

@@ -17,7 +17,7 @@ pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     // Where photons are worth having, those of the final gather are too.
     suits: |_| None,
     build: |cx| match cx.maps.caustic {
-        None => Box::new(Path::<false> { cx }),
-        Some(_) => Box::new(Path::<true> { cx }),
+        None => Box::new(Path::<false>::new(cx)),
+        Some(_) => Box::new(Path::<true>::new(cx)),
     },
 };

@@ -2,9 +2,11 @@
 
 use super::RenderContext;
 use crate::color::Rgb;
+use crate::effects::specular_part;
 use crate::geometry::{LightId, Ray, SurfacePoint};
 use crate::materials::{BsdfValue, LobeClass, Scattering};
 use crate::math::DVec3;
+use crate::stats::tally::Part;
 
 /// The power heuristic with exponent 2 (Veach 1997, 9.2.4) for `na` samples of density `a`
 /// against `nb` of density `b`.
@@ -79,7 +81,7 @@ impl View {
     /// Radiance that a ray which leaves the scene sees, near and at infinity.
     pub(super) fn escaped(&self, cx: &RenderContext<'_>, ray: &Ray) -> Rgb {
         let mut sum = self.crossed(cx, ray, f64::INFINITY);
-        if cx.scene.infinite().is_empty() {
+        if cfg!(dualight_without = "environment") || cx.scene.infinite().is_empty() {
             return sum;
         }
         let dir = ray.direction().normalize_or_zero();
@@ -109,8 +111,20 @@ impl DirectSample {
     /// Whether what glossy lobes make of it is followed.
     #[inline]
     pub(super) fn follows_glossy(&self, cx: &RenderContext<'_>, sp: &SurfacePoint) -> bool {
-        let through = (self.ray.direction().dot(sp.ng) > 0.0) != sp.front;
-        cx.effects.follow(cx.scene, sp, LobeClass::Glossy, through)
+        let class = LobeClass::Glossy;
+        cx.effects.allows(cx.scene, sp, class, self.passes(sp))
+    }
+
+    /// What that is part of.
+    #[inline]
+    pub(super) fn glossy_part(&self, cx: &RenderContext<'_>, sp: &SurfacePoint) -> Part {
+        specular_part(cx.scene, sp, self.passes(sp))
+    }
+
+    /// Whether it comes through the surface.
+    #[inline]
+    fn passes(&self, sp: &SurfacePoint) -> bool {
+        (self.ray.direction().dot(sp.ng) > 0.0) != sp.front
     }
 }
 

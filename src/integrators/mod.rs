@@ -31,7 +31,7 @@ pub use visibility::Visibility;
 use crate::accel::Accelerator;
 use crate::effects::EffectSet;
 use crate::error::Result;
-use crate::film::PixelSample;
+use crate::film::{Component, PixelSample};
 use crate::geometry::{Differential, LightId, Ray, SurfacePoint};
 use crate::math::DVec3;
 use crate::photons::PhotonMaps;
@@ -76,6 +76,17 @@ impl RenderContext<'_> {
     fn pdf_light(&self, from: DVec3, on: &SurfacePoint) -> f64 {
         self.scene.pdf_light(from, on, self.visibility.at(from))
     }
+}
+
+/// Whether a component of the image is left by the effects that are simulated.
+#[inline]
+pub fn keeps(effects: EffectSet, component: Component) -> bool {
+    effects.intersects(match component {
+        Component::Direct => EffectSet::DIRECT,
+        Component::Specular => EffectSet::SPECULAR.union(EffectSet::REFRACTION),
+        Component::Caustics => EffectSet::CAUSTICS,
+        Component::Indirect => EffectSet::INDIRECT,
+    })
 }
 
 /// Estimates radiance along camera rays.

@@ -8,7 +8,9 @@ use arrayvec::ArrayVec;
 use super::footprint::Trail;
 use super::light_sampling::{View, power_heuristic, sample_direct};
 use super::stored_light::{Stored, sites};
-use super::{BATCH, Integrator, IntegratorEntry, PhotonNeeds, RenderContext, Sample, Scratch};
+use super::{
+    BATCH, Integrator, IntegratorEntry, PhotonNeeds, RenderContext, Sample, Scratch, keeps,
+};
 use crate::color::Rgb;
 use crate::effects::EffectSet;
 use crate::film::{Component, PixelSample};
@@ -17,6 +19,7 @@ use crate::materials::{Bsdf, BsdfValue, LobeClass, Scattering, TransportMode};
 use crate::math::DVec3;
 use crate::sampling::Sampler;
 use crate::scene::{Inside, Scene};
+use crate::stats::tally::{self, Event, Part};
 
 /// Scattering events after which roulette begins.
 const ROULETTE_DEPTH: u32 = 3;
@@ -87,7 +90,29 @@ impl Walk {
 
 /// `PHOTONS`: whether `D S⁺ L` comes from photon maps.
 pub(super) struct Path<'a, const PHOTONS: bool> {
-    pub(super) cx: RenderContext<'a>,
+    cx: RenderContext<'a>,
+    /// What segments are traced for after a diffuse surface, by the [`Walk`] so far.
+    beyond: [Part; 5],
+}
+
+impl<'a, const PHOTONS: bool> Path<'a, PHOTONS> {
+    pub(super) fn new(cx: RenderContext<'a>) -> Self {
+        let on = |effect, part| cx.effects.contains(effect).then_some(part);
+        let indirect = on(EffectSet::INDIRECT, Part::Indirect);
+        let caustics = on(EffectSet::CAUSTICS, Part::Caustics);
+        let mut beyond = [Part::Rest; 5];
+        for (walk, part) in [
+            (Walk::Diffuse, indirect.or(caustics).unwrap_or(Part::Direct)),
+            (
+                Walk::DiffuseSpecular,
+                caustics.or(indirect).unwrap_or(Part::Rest),
+            ),
+            (Walk::Indirect, indirect.unwrap_or(Part::Rest)),
+        ] {
+            beyond[walk as usize] = part;
+        }
+        Self { cx, beyond }
+    }
 }
 
 /// A path on its way.
@@ -104,6 +129,8 @@ struct Walker {
     focused: bool,
     /// Density and origin of the last BSDF sample; none for a delta lobe or the camera.
     last: Option<(f64, DVec3)>,
+    /// What its segment is traced for.
+    part: Part,
     /// Index of the sum that it adds to.
     pixel: usize,
 }
@@ -120,6 +147,7 @@ impl Walker {
             left_diffuse: 0,
             focused: false,
             last: None,
+            part: Part::Rest,
             pixel: sample.pixel,
         }
     }
@@ -130,6 +158,7 @@ struct Direct {
     ray: Ray,
     value: BsdfValue,
     walk: Walk,
+    part: Part,
     pixel: usize,
 }
 
@@ -153,9 +182,11 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
         let mut points: ArrayVec<SurfacePoint, BATCH> = ArrayVec::new();
         let mut lights: ArrayVec<Direct, BATCH> = ArrayVec::new();
         scratch.rays.camera += alive.len() as u64;
+        let mut scope = tally::enter(Part::Rest);
         for depth in 0.. {
             alive.retain(|&mut i| {
                 let w = &walkers[i];
+                scope.switch(w.part);
                 let hit = accel.intersect(&w.ray);
                 match &hit {
                     Some(hit) => points.push(scene.surface_point(&w.ray, hit)),
@@ -166,6 +197,7 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
             let mut met = points.iter();
             alive.retain(|&mut i| {
                 let w = &mut walkers[i];
+                scope.switch(w.part);
                 let sum = &mut sums[w.pixel];
                 met.next()
                     .is_some_and(|sp| self.scatter(depth, w, sp, sum, &mut lights, scratch))
@@ -173,6 +205,7 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
             scratch.rays.shadow += lights.len() as u64;
             scratch.rays.bounce += alive.len() as u64;
             for light in &lights {
+                scope.switch(light.part);
                 if !accel.occluded(&light.ray) {
                     let sum = &mut sums[light.pixel];
                     let diffuse = light.walk.after(LobeClass::Diffuse).component();
@@ -283,7 +316,9 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
         let mut beta = w.beta;
         if w.left_diffuse == 0 {
             if let Some(map) = &self.cx.maps.caustic {
-                let e = stored.density(map, &sites, bsdf, |_| true, scratch);
+                let _scope = tally::enter(Part::Caustics);
+                let lookup = Event::CausticLookups;
+                let e = stored.density(map, &sites, bsdf, |_| true, lookup, scratch);
                 out.add(near, beta * e.value);
                 out.photons[1] += e.density;
             }
@@ -316,32 +351,27 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
         }
         if bsdf.has_finite() {
             let u = w.sampler.next_2d();
-            if let Some(mut direct) = sample_direct(cx, sp, bsdf, u, 1.0, 1.0) {
-                let dropped = PHOTONS && w.left_diffuse > 0;
-                if S::GLOSSY && (dropped || !direct.follows_glossy(cx, sp)) {
-                    direct.value.glossy = Rgb::ZERO;
-                }
-                direct.value.diffuse *= w.beta;
-                if S::GLOSSY {
-                    direct.value.glossy *= w.beta;
-                }
-                lights.push(Direct {
-                    ray: direct.ray,
-                    value: direct.value,
-                    walk: w.walk,
-                    pixel: w.pixel,
-                });
-            }
+            self.ask(w, sp, bsdf, u, lights);
         }
         let u = w.sampler.next_2d();
         let Some(s) = bsdf.sample(w.sampler.next_1d(), u) else {
             return false;
         };
-        if !cx.effects.follow(cx.scene, sp, s.class, s.transmitted) {
+        let Some(follows) = cx.effects.follow(cx.scene, sp, s.class, s.transmitted) else {
+            return false;
+        };
+        w.beta *= s.weight;
+        let walk = w.walk.after(s.class);
+        if !walk.goes_on(cx.effects) && !keeps(cx.effects, walk.component()) {
             return false;
         }
-        w.beta *= s.weight;
-        w.walk = w.walk.after(s.class);
+        w.part = match walk {
+            // Once it has been seen in a mirror, everything belongs to that.
+            Walk::Camera | Walk::Specular if s.class == LobeClass::Diffuse => w.part,
+            Walk::Camera | Walk::Specular => follows,
+            Walk::Diffuse | Walk::DiffuseSpecular | Walk::Indirect => self.beyond[walk as usize],
+        };
+        w.walk = walk;
         if PHOTONS {
             let diffuse = s.class == LobeClass::Diffuse;
             w.left_diffuse += u32::from(diffuse);
@@ -365,7 +395,64 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
             None => w.differential = None,
             left => w.differential = left,
         }
+        tally::ray(w.part);
         true
+    }
+
+    /// Asks for light from elsewhere, of what is simulated.
+    #[inline(always)]
+    fn ask<S: Scattering>(
+        &self,
+        w: &Walker,
+        sp: &SurfacePoint,
+        bsdf: &S,
+        u: [f64; 2],
+        lights: &mut ArrayVec<Direct, BATCH>,
+    ) {
+        let cx = &self.cx;
+        let mut part = match w.walk {
+            Walk::Camera => Part::Direct,
+            Walk::Specular => w.part,
+            Walk::Diffuse | Walk::DiffuseSpecular | Walk::Indirect => Part::Indirect,
+        };
+        let mut scope = tally::enter(w.part);
+        let kept = keeps(cx.effects, w.walk.after(LobeClass::Diffuse).component());
+        if kept {
+            scope.switch(part);
+        }
+        let Some(mut direct) = sample_direct(cx, sp, bsdf, u, 1.0, 1.0) else {
+            return;
+        };
+        if !kept {
+            direct.value.diffuse = Rgb::ZERO;
+        }
+        direct.value.diffuse *= w.beta;
+        if S::GLOSSY {
+            let glossy = w.walk.after(LobeClass::Glossy).component();
+            let dropped = PHOTONS && w.left_diffuse > 0 || !keeps(cx.effects, glossy);
+            if dropped || !direct.follows_glossy(cx, sp) {
+                direct.value.glossy = Rgb::ZERO;
+            }
+            direct.value.glossy *= w.beta;
+            if direct.value.diffuse.is_black() {
+                part = match glossy {
+                    Component::Caustics => Part::Caustics,
+                    Component::Indirect => Part::Indirect,
+                    _ => direct.glossy_part(cx, sp),
+                };
+            }
+        }
+        if direct.value.diffuse.is_black() && (!S::GLOSSY || direct.value.glossy.is_black()) {
+            return;
+        }
+        tally::ray(part);
+        lights.push(Direct {
+            ray: direct.ray,
+            value: direct.value,
+            walk: w.walk,
+            part,
+            pixel: w.pixel,
+        });
     }
 }
 
@@ -375,5 +462,5 @@ pub(super) const ENTRY: IntegratorEntry = IntegratorEntry {
     doc: "unbiased path tracing with next-event estimation and MIS: the reference",
     photons: PhotonNeeds::None,
     suits: |outlook| Some(outlook.wants_paths()),
-    build: |cx| Box::new(Path::<false> { cx }),
+    build: |cx| Box::new(Path::<false>::new(cx)),
 };

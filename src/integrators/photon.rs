@@ -23,6 +23,7 @@ use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::math::DVec3;
 use crate::sampling::Sampler;
 use crate::scene::Inside;
+use crate::stats::tally::{self, Part};
 
 /// Longest chain of specular surfaces.
 pub(super) const CHAIN_GUARD: u32 = 256;
@@ -58,6 +59,8 @@ struct Chain {
     depth: u32,
     /// Density and origin of the last direction; none for a delta lobe or the camera.
     last: Option<(f64, DVec3)>,
+    /// What it is followed for.
+    part: Part,
 }
 
 impl Integrator for PhotonMapping<'_> {
@@ -73,6 +76,7 @@ impl Integrator for PhotonMapping<'_> {
                 gathering: sample.gathering,
                 depth: 0,
                 last: None,
+                part: Part::Rest,
             });
             let mut diffuse_seen = false;
             while let Some(chain) = pending.pop() {
@@ -110,8 +114,11 @@ impl PhotonMapping<'_> {
             mut gathering,
             depth: start,
             mut last,
+            mut part,
         } = chain;
+        let mut scope = tally::enter(part);
         for depth in start.. {
+            scope.switch(part);
             // Of what is seen along this ray.
             let component = if depth == 0 {
                 Component::Direct
@@ -182,14 +189,20 @@ impl PhotonMapping<'_> {
             if depth < SPLIT_DEPTH {
                 // Reflection and refraction are both followed: their shares are known exactly,
                 // and a rare bright reflection is the worst noise that glass has.
-                if let Some(mut branches) = bsdf.branches() {
-                    branches.retain(|b| {
+                if let Some(branches) = bsdf.branches() {
+                    let mut branches: ArrayVec<_, 4> = branches
+                        .into_iter()
                         // A path of one colour has no use for the other branches of a prism.
-                        !(beta * b.weight).is_black()
-                            && cx.effects.follow(cx.scene, &sp, b.class, b.transmitted)
-                    });
-                    let Some(main) = branches.pop() else { return };
-                    for b in branches {
+                        .filter(|b| !(beta * b.weight).is_black())
+                        .filter_map(|b| {
+                            let (class, through) = (b.class, b.transmitted);
+                            Some((b, cx.effects.follow(cx.scene, &sp, class, through)?))
+                        })
+                        .collect();
+                    let Some((main, follows)) = branches.pop() else {
+                        return;
+                    };
+                    for (b, part) in branches {
                         let side = Chain {
                             ray: sp.spawn(b.wi),
                             differential: trail.leave(&sp, &b),
@@ -198,8 +211,10 @@ impl PhotonMapping<'_> {
                             gathering,
                             depth: depth + 1,
                             last: None,
+                            part,
                         };
                         scratch.rays.bounce += 1;
+                        tally::ray(part);
                         if pending.try_push(side).is_err() {
                             debug_assert!(false, "more chains than splits allow");
                         }
@@ -209,7 +224,9 @@ impl PhotonMapping<'_> {
                     ray = sp.spawn(main.wi);
                     differential = trail.leave(&sp, &main);
                     inside = trail.beyond(&main);
+                    part = follows;
                     scratch.rays.bounce += 1;
+                    tally::ray(part);
                     continue;
                 }
             }
@@ -218,6 +235,7 @@ impl PhotonMapping<'_> {
                 let direct = sample_direct(cx, &sp, &bsdf, u, 1.0, 1.0);
                 if let Some(direct) = direct.filter(|d| d.follows_glossy(cx, &sp)) {
                     scratch.rays.shadow += 1;
+                    tally::ray(direct.glossy_part(cx, &sp));
                     if !cx.accel.occluded(&direct.ray) {
                         out.add(Component::Specular, beta * direct.value.glossy);
                     }
@@ -227,9 +245,10 @@ impl PhotonMapping<'_> {
             let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
                 return;
             };
-            if !cx.effects.follow(cx.scene, &sp, s.class, s.transmitted) {
+            let Some(follows) = cx.effects.follow(cx.scene, &sp, s.class, s.transmitted) else {
                 return;
-            }
+            };
+            part = follows;
             beta *= s.weight;
             last = (s.class != LobeClass::Delta).then_some((s.pdf, sp.p));
             if cx.settings.roulette && depth + 1 >= ROULETTE_DEPTH {
@@ -246,6 +265,7 @@ impl PhotonMapping<'_> {
             differential = trail.leave(&sp, &s);
             inside = trail.beyond(&s);
             scratch.rays.bounce += 1;
+            tally::ray(part);
         }
     }
 }

@@ -191,8 +191,8 @@ impl<'a> Glints<'a> {
             if chain.depth >= DEPTH || cx.scene.matte(&sp).is_some() {
                 continue;
             }
-            let differential = Some(chain.differential);
-            let trail = Trail::land(&differential, chain.inside, cx.scene, &chain.ray, &sp);
+            let differential = &chain.differential;
+            let trail = Trail::land_to_plan(differential, chain.inside, cx.scene, &chain.ray, &sp);
             let through = cx.scene.transmittance(&sp, trail.crossing());
             let mut bsdf = Bsdf::new(&sp, TransportMode::Radiance);
             cx.scene.scatter(&sp, trail.footprint(), &mut bsdf);
@@ -204,7 +204,7 @@ impl<'a> Glints<'a> {
                     continue;
                 };
                 if beta.max_channel() < FAINT
-                    || !cx.effects.follow(cx.scene, &sp, b.class, b.transmitted)
+                    || !cx.effects.allows(cx.scene, &sp, b.class, b.transmitted)
                 {
                     continue;
                 }

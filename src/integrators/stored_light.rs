@@ -10,6 +10,7 @@ use crate::geometry::SurfacePoint;
 use crate::materials::Scattering;
 use crate::photons::map::{Estimate, IrradianceSample, PhotonMap, Site, Surroundings};
 use crate::photons::{PhotonClass, PhotonMaps};
+use crate::stats::tally::{self, Event, Part};
 
 /// Where photons count at a surface: on the side that is seen, and on the other one too if
 /// diffuse light comes through. The first is the side that is seen.
@@ -42,17 +43,20 @@ impl<'a> Stored<'a> {
 }
 
 impl Stored<'_> {
-    /// Radiance that diffuse lobes send back of the photons of a map that `keep` accepts.
+    /// Radiance that diffuse lobes send back of the photons of a map that `keep` accepts; counted
+    /// as `lookup`.
     pub(super) fn density(
         &self,
         map: &PhotonMap,
         sites: &[Site],
         bsdf: &impl Scattering,
         keep: impl Fn(PhotonClass) -> bool,
+        lookup: Event,
         scratch: &mut Scratch,
     ) -> Estimate {
         let mut sum = Estimate::default();
         for site in sites {
+            tally::count(lookup);
             let f = |wi| bsdf.diffuse_f(wi);
             let e = map.estimate(site, self.around, &mut scratch.nearest, &keep, f);
             sum.value += e.value;
@@ -64,7 +68,9 @@ impl Stored<'_> {
 
     /// The irradiance estimated nearest to a site.
     pub(super) fn irradiance(&self, site: &Site) -> Option<&IrradianceSample> {
-        self.maps.irradiance.as_ref()?.nearest(site)
+        let map = self.maps.irradiance.as_ref()?;
+        tally::count(Event::GlobalLookups);
+        map.nearest(site)
     }
 
     /// Radiance that diffuse lobes which are not Lambert's send back, from all photons but
@@ -79,7 +85,8 @@ impl Stored<'_> {
             return Rgb::ZERO;
         };
         let keep = |class| class != PhotonClass::Caustic;
-        self.density(map, sites, bsdf, keep, scratch).value
+        let lookup = Event::GlobalLookups;
+        self.density(map, sites, bsdf, keep, lookup, scratch).value
     }
 
     /// Radiance sent back of the light that caustics on other surfaces shed here. Diffuse lobes
@@ -88,6 +95,8 @@ impl Stored<'_> {
         let Some(map) = &self.maps.glow else {
             return Rgb::ZERO;
         };
+        let _scope = tally::enter(Part::Caustics);
+        tally::count(Event::CausticLookups);
         let albedos = [bsdf.reflected_albedo(), bsdf.transmitted_albedo()];
         let mut sum = Rgb::ZERO;
         for (site, albedo) in sites.iter().zip(albedos) {

@@ -8,6 +8,7 @@ use crate::color::Rgb;
 use crate::geometry::{Surface, SurfacePoint};
 use crate::math::{BoundingSphere, DQuat, DVec3};
 use crate::sampling::warp;
+use crate::stats::tally::{self, Event, Part};
 
 struct Environment {
     /// None for one colour.
@@ -27,6 +28,15 @@ impl Environment {
             .as_ref()
             .map_or(Rgb::splat(4.0 * PI), |sky| sky.total);
         self.strength * total
+    }
+
+    /// Radiance from a direction.
+    fn toward(&self, dir: DVec3) -> Rgb {
+        let sky = match &self.sky {
+            None => Rgb::ONE,
+            Some(sky) => sky.radiance(self.rotation.inverse() * dir),
+        };
+        self.strength * sky
     }
 
     /// A direction toward the sky, and its density.
@@ -52,11 +62,13 @@ impl Light for Environment {
     }
 
     fn sample_li(&self, _p: DVec3, u: [f64; 2]) -> Option<LiSample> {
+        let _scope = tally::enter(Part::Environment);
+        tally::count(Event::SkySamples);
         let (wi, pdf) = self.sample(u)?;
         Some(LiSample {
             wi,
             target: None,
-            radiance: self.escaped(wi),
+            radiance: self.toward(wi),
             pdf,
             delta: false,
         })
@@ -79,11 +91,9 @@ impl Light for Environment {
     }
 
     fn escaped(&self, dir: DVec3) -> Rgb {
-        let sky = match &self.sky {
-            None => Rgb::ONE,
-            Some(sky) => sky.radiance(self.rotation.inverse() * dir),
-        };
-        self.strength * sky
+        let _scope = tally::enter(Part::Environment);
+        tally::count(Event::SkyLookups);
+        self.toward(dir)
     }
 
     fn pdf_escaped(&self, dir: DVec3) -> f64 {
@@ -94,10 +104,12 @@ impl Light for Environment {
     }
 
     fn sample_distant(&self, u: [f64; 2]) -> Option<Distant> {
+        let _scope = tally::enter(Part::Environment);
+        tally::count(Event::SkySamples);
         let (toward, pdf) = self.sample(u)?;
         Some(Distant {
             direction: -toward,
-            irradiance: self.escaped(toward) / pdf,
+            irradiance: self.toward(toward) / pdf,
         })
     }
 

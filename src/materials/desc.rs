@@ -222,7 +222,9 @@ impl MaterialDesc {
         let absorbs = self.volume
             && self.transmission.max(self.diffuse_transmission) > 0.0
             && self.attenuation_distance.is_finite()
-            && self.attenuation_distance > 0.0;
+            && self.attenuation_distance > 0.0
+            // White is what is left of light that is not absorbed.
+            && !(self.attenuation_color - Rgb::ONE).map(|c| c.min(0.0)).is_black();
         absorbs.then(|| Interior {
             absorption: self
                 .attenuation_color

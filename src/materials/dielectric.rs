@@ -1,6 +1,7 @@
 //! `dielectric`: clear glass, smooth or rough, solid or thin-walled. In glTF: metallic 0,
 //! transmission 1; solid with `KHR_materials_volume`, thin-walled without.
 
+use super::bsdf::FrameId;
 use super::filmed::FacetFilm;
 use super::lobes::{GgxDielectric, Lobe, SmoothDielectric, ThinDielectric, ThinGgx};
 use super::microfacet::Ggx;
@@ -8,6 +9,7 @@ use super::thin_film::ThinFilm;
 use super::{Bsdf, Interior, Material, MaterialDesc, MaterialEntry, MaterialTraits};
 use crate::color::Rgb;
 use crate::geometry::Surface;
+use crate::stats::tally::{self, Event};
 
 /// The transmitting part of a dielectric; shared with the general glTF material.
 #[derive(Clone, Copy)]
@@ -50,10 +52,12 @@ impl Interface {
     }
 
     /// Pushes the lobes, seen from the front or from inside: one, or one for each channel if
-    /// the index depends on the wavelength.
+    /// the index depends on the wavelength. `events` are counted when they are evaluated.
     #[inline]
-    pub(super) fn push(&self, front: bool, bsdf: &mut Bsdf) {
-        if self.dispersion > 0.0 && !self.thin {
+    pub(super) fn push(&self, front: bool, events: u32, bsdf: &mut Bsdf) {
+        let disperses = !cfg!(dualight_without = "dispersion") && self.dispersion > 0.0;
+        if disperses && !self.thin {
+            tally::count(Event::Dispersions);
             // KHR_materials_dispersion: the indices of red, green and blue.
             let half = (self.ior - 1.0) * 0.025 * self.dispersion;
             let channels = [
@@ -65,10 +69,12 @@ impl Interface {
                 .into_iter()
                 .zip(channels)
             {
-                bsdf.push(self.lobe(front, ior.max(1.0), channel * self.share));
+                let lobe = self.lobe(front, ior.max(1.0), channel * self.share);
+                bsdf.push_in(lobe, FrameId::MAIN, events);
             }
         } else {
-            bsdf.push(self.lobe(front, self.ior, Rgb::splat(self.share)));
+            let lobe = self.lobe(front, self.ior, Rgb::splat(self.share));
+            bsdf.push_in(lobe, FrameId::MAIN, events);
         }
     }
 
@@ -123,7 +129,7 @@ struct DielectricMaterial {
 impl Material for DielectricMaterial {
     #[inline]
     fn scatter(&self, at: &Surface<'_>, bsdf: &mut Bsdf) {
-        self.interface.push(at.sp.front, bsdf);
+        self.interface.push(at.sp.front, 0, bsdf);
     }
 
     fn traits(&self) -> MaterialTraits {

@@ -118,6 +118,7 @@ mod tests {
             transmission: 0.5,
             volume: true,
             attenuation_distance: 1.0,
+            attenuation_color: Rgb::splat(0.5),
             dispersion: 1.0,
             clearcoat: 1.0,
             sheen_color: Rgb::ONE,

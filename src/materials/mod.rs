@@ -13,6 +13,7 @@ mod cover;
 mod desc;
 mod filmed;
 pub mod fresnel;
+mod idle;
 mod layer;
 pub mod lobes;
 mod microfacet;

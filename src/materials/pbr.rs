@@ -32,7 +32,9 @@ impl Material for Pbr {
             colored.base_color *= Rgb::new(r, g, b);
             values = &colored;
         }
-        if let Some(textures) = &self.textures {
+        if !cfg!(dualight_without = "textures")
+            && let Some(textures) = &self.textures
+        {
             colored = textures.evaluate(values, at);
             values = &colored;
             tangent_set = textures.tangent_set();
@@ -45,7 +47,8 @@ impl Material for Pbr {
                 bsdf.set_normal(n);
             }
         }
-        if values.anisotropy > 0.0
+        if !cfg!(dualight_without = "anisotropy")
+            && values.anisotropy > 0.0
             && let Some([t, b]) = at.tangents(tangent_set)
         {
             let (s, c) = values.anisotropy_rotation.sin_cos();

@@ -4,6 +4,7 @@ use super::values::Values;
 use crate::color::Rgb;
 use crate::geometry::Surface;
 use crate::math::DVec3;
+use crate::stats::tally::{self, Event, Part};
 use crate::textures::Texture;
 
 macro_rules! slots {
@@ -77,6 +78,7 @@ fn rgb(t: [f64; 4]) -> Rgb {
 impl TextureSlots {
     /// `values` multiplied by what the textures say at a point.
     pub(super) fn evaluate(&self, values: &Values, at: &Surface<'_>) -> Values {
+        let _scope = tally::enter(Part::Textures);
         self.apply(values, |t| t.sample(at))
     }
 
@@ -174,8 +176,10 @@ impl TextureSlots {
 
 /// A tangent-space normal in world space (glTF 2.0, 3.9.3).
 fn mapped(texture: &Texture, scale: f64, at: &Surface<'_>) -> Option<DVec3> {
+    let _scope = tally::enter(Part::Normals);
     let [t, b] = at.tangents(texture.uv_set)?;
     let s = texture.sample(at);
     let (x, y, z) = (2.0 * s[0] - 1.0, 2.0 * s[1] - 1.0, 2.0 * s[2] - 1.0);
+    tally::count(Event::PerturbedFrames);
     (t * (x * scale) + b * (y * scale) + at.sp.n * z).try_normalize()
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{Bsdf, Material, MaterialEntry, MaterialTraits, TextureSlots};
 use crate::color::Rgb;
 use crate::geometry::Surface;
+use crate::stats::tally::{self, Part};
 
 /// Seen directly or by way of specular surfaces it has its colour; it takes part in no other
 /// transport: it neither reflects nor lights anything.
@@ -18,6 +19,7 @@ impl Material for Unlit {
     fn scatter(&self, at: &Surface<'_>, bsdf: &mut Bsdf) {
         let mut color = self.color;
         if let Some(texture) = self.textures.as_ref().and_then(|t| t.base_color.as_ref()) {
+            let _scope = tally::enter(Part::Textures);
             let [r, g, b, _] = texture.sample(at);
             color *= Rgb::new(r, g, b);
         }

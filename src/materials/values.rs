@@ -13,6 +13,7 @@ use super::thin_film::ThinFilm;
 use super::{Brushing, Bsdf};
 use super::{Interior, MaterialDesc, MaterialTraits};
 use crate::color::Rgb;
+use crate::stats::tally::Event;
 
 /// Index of refraction of the clear coat (`KHR_materials_clearcoat`).
 const COAT_IOR: f64 = 1.5;
@@ -121,7 +122,8 @@ impl Values {
             thickness: self.iridescence_thickness,
         };
         let strength = self.iridescence * film.presence();
-        (strength > 0.0).then_some((film, strength))
+        let there = !cfg!(dualight_without = "iridescence") && strength > 0.0;
+        there.then_some((film, strength))
     }
 
     /// The microfacet distribution (`KHR_materials_anisotropy` widens it along the tangent).
@@ -140,6 +142,13 @@ impl Values {
         let opaque = dielectric - through;
         let layer = self.dielectric_layer();
         let film = self.film();
+        let mut events = 0;
+        if film.is_some() {
+            events |= Event::FilmLobes.bit();
+        }
+        if !cfg!(dualight_without = "anisotropy") && self.anisotropy > 0.0 {
+            events |= Event::BrushedLobes.bit();
+        }
 
         if opaque > 0.0 {
             let mut base = self.base_color * opaque;
@@ -154,15 +163,16 @@ impl Values {
                 let cover = self.layer_albedo(&layer, film.as_ref());
                 bsdf.push(CoatedLambert::new(staying, cover));
             }
-            if self.diffuse_transmission > 0.0 {
-                bsdf.push(DiffuseTransmission::new(
+            if !cfg!(dualight_without = "translucency") && self.diffuse_transmission > 0.0 {
+                let lobe = DiffuseTransmission::new(
                     passing * self.diffuse_transmission_color,
                     self.layer_albedo(&layer, film.as_ref()),
-                ));
+                );
+                bsdf.push_in(lobe, FrameId::MAIN, Event::TranslucentLobes.bit());
             }
         }
         if through > 0.0 {
-            self.interface(through).push(front, bsdf);
+            self.interface(through).push(front, events, bsdf);
         }
         // Metal and dielectric reflect alike: Schlick's term is linear in f0 and f90.
         let schlick = Schlick {
@@ -180,14 +190,15 @@ impl Values {
                 opaque,
             }),
         };
-        bsdf.push(reflection(self.is_smooth(), self.ggx(), fresnel));
+        let lobe = reflection(self.is_smooth(), self.ggx(), fresnel);
+        bsdf.push_in(lobe, FrameId::MAIN, events);
 
-        if !self.sheen_color.is_black() {
+        if !cfg!(dualight_without = "sheen") && !self.sheen_color.is_black() {
             let sheen = Sheen::new(self.sheen_color, self.sheen_roughness);
             bsdf.cover(Cover::sheen(&sheen), FrameId::MAIN);
-            bsdf.push(sheen);
+            bsdf.push_in(sheen, FrameId::MAIN, Event::SheenLobes.bit());
         }
-        if self.clearcoat > 0.0 {
+        if !cfg!(dualight_without = "coat") && self.clearcoat > 0.0 {
             let r = f0(COAT_IOR, 1.0);
             let fresnel = Schlick {
                 f0: Rgb::splat(r * self.clearcoat),
@@ -198,7 +209,7 @@ impl Values {
             let alpha = self.clearcoat_roughness.max(MaterialDesc::SMOOTH).powi(2);
             let smooth = self.clearcoat_roughness < MaterialDesc::SMOOTH;
             let lobe = reflection(smooth, Ggx::round(alpha), Fresnel::Schlick(fresnel));
-            bsdf.push_in(lobe, coat);
+            bsdf.push_in(lobe, coat, Event::CoatLobes.bit());
         }
     }
 

@@ -45,6 +45,7 @@ use crate::control::Control;
 use crate::effects::EffectSet;
 use crate::sampling::{hash2, stream};
 use crate::scene::Scene;
+use crate::stats::tally::{self, Part};
 use crate::stats::{PhotonCounts, RayCounts};
 
 /// What the photon pass is told.
@@ -144,10 +145,9 @@ pub fn trace_photons(
         ratio: whole as f64 / part as f64,
     };
     let start = Instant::now();
-    let indirect = effects.contains(EffectSet::INDIRECT) && settings.global > 0;
-    if effects.contains(EffectSet::CAUSTICS) && settings.caustic > 0 {
-        let scout = run(Purpose::Caustic, &pilot, &mut maps);
-        let pass = run(Purpose::Caustic, settings, &mut maps);
+    let caustics = |maps: &mut PhotonMaps| {
+        let scout = run(Purpose::Caustic, &pilot, maps);
+        let pass = run(Purpose::Caustic, settings, maps);
         maps.caustic_counts = pass.counts;
         maps.caustic_counts.pilot = pilot.caustic;
         let deciding = deciding(settings.caustic, pilot.caustic);
@@ -160,10 +160,10 @@ pub fn trace_photons(
             let glow = PhotonMap::build(pass.glow, settings.nearest, area);
             maps.glow = Some(IrradianceMap::build(&glow, kernels, all, control));
         }
-    }
-    if indirect {
-        let scout = run(Purpose::Global, &pilot, &mut maps);
-        let pass = run(Purpose::Global, settings, &mut maps);
+    };
+    let global = |maps: &mut PhotonMaps| {
+        let scout = run(Purpose::Global, &pilot, maps);
+        let pass = run(Purpose::Global, settings, maps);
         maps.global_counts = pass.counts;
         maps.global_counts.pilot = pilot.global;
         let map = PhotonMap::build(pass.photons, settings.nearest, area);
@@ -178,6 +178,12 @@ pub fn trace_photons(
             maps.irradiance = Some(IrradianceMap::build(&map, kernels, keep, control));
         }
         maps.global = Some(map);
+    };
+    if effects.contains(EffectSet::CAUSTICS) && settings.caustic > 0 {
+        tally::stage(Part::Caustics, || caustics(&mut maps));
+    }
+    if effects.contains(EffectSet::INDIRECT) && settings.global > 0 {
+        tally::stage(Part::Indirect, || global(&mut maps));
     }
     maps.building = start.elapsed().as_secs_f64() - maps.tracing;
     maps

@@ -9,9 +9,10 @@ use crate::accel::Accelerator;
 use crate::control::Control;
 use crate::effects::EffectSet;
 use crate::lights::range_window;
-use crate::materials::{Bsdf, LobeClass, TransportMode};
+use crate::materials::{Bsdf, BsdfSample, LobeClass, TransportMode};
 use crate::sampling::{Rng, hash2, stream};
 use crate::scene::Scene;
+use crate::stats::tally::{self, Event, Part};
 use crate::stats::{PhotonCounts, RayCounts};
 
 /// Photons followed by one task: enough to hide the cost of a task, few enough to share evenly.
@@ -53,9 +54,9 @@ pub fn follow_photons(
     control: &Control,
 ) -> StoredPhotons {
     let n = source.len();
-    let name = match purpose {
-        Purpose::Global => "global photons",
-        Purpose::Caustic => "caustic photons",
+    let (name, part, event) = match purpose {
+        Purpose::Global => ("global photons", Part::Indirect, Event::GlobalPhotons),
+        Purpose::Caustic => ("caustic photons", Part::Caustics, Event::CausticPhotons),
     };
     let stage = control.stage(name, "photons", n);
     let tracer = Tracer {
@@ -79,6 +80,8 @@ pub fn follow_photons(
             }
         }
         stage.advance(hi - lo);
+        tally::rays(part, batch.segments);
+        tally::count_many(event, batch.photons.len() as u64);
         batch
     };
     in_order(n.div_ceil(BATCH), follow, |b| {
@@ -173,7 +176,12 @@ impl Tracer<'_> {
                 out.ledger.absorbed += power;
                 return;
             };
-            if !self.effects.follow(self.scene, &sp, s.class, s.transmitted) {
+            let follow = |s: &BsdfSample| {
+                self.effects
+                    .follow(self.scene, &sp, s.class, s.transmitted)
+                    .is_some()
+            };
+            if !follow(&s) {
                 out.ledger.absorbed += power;
                 return;
             }

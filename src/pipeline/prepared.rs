@@ -14,6 +14,7 @@ use crate::photons::{Photon, PhotonMaps, PhotonSettings, trace_photons};
 use crate::plugins::Registry;
 use crate::scene::Scene;
 use crate::stats::StageTime;
+use crate::stats::tally::{self, Part};
 
 /// Samples of a pixel in a trial.
 const SAMPLES: u32 = 4;
@@ -66,7 +67,7 @@ pub(super) fn build(
     };
     clock.lap("build");
     if !scene.textures.is_empty() {
-        scene.prepare_textures();
+        tally::stage(Part::Textures, || scene.prepare_textures());
         clock.lap("textures");
     }
     Ok(Prepared {

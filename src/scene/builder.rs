@@ -5,6 +5,7 @@
 //! positions are taken relative to its centre before they are rounded to single precision, so
 //! that it keeps its digits.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::bake;
@@ -92,7 +93,8 @@ pub struct SceneBuilder {
         Option<Arc<dyn Coverage>>,
         Option<Medium>,
     )>,
-    textures: Vec<Texture>,
+    /// Of each material, those that are averaged over what a sample sees.
+    textures: Vec<Vec<Texture>>,
     placements: Vec<MeshPlacement>,
     lights: Vec<LightDesc>,
     cameras: Vec<CameraDesc>,
@@ -171,8 +173,14 @@ impl SceneBuilder {
                 &cut
             }
         };
+        let named = desc.extras.get("dualight_material");
+        // What a kind of one's own makes of a texture is not known.
+        let desc = &*match named {
+            Some(_) => Cow::Borrowed(desc),
+            None => desc.without_idle_textures(),
+        };
         let table = &self.plugins.materials;
-        let entry = match desc.extras.get("dualight_material") {
+        let entry = match named {
             Some(kind) => table.find(kind.as_str().unwrap_or_default())?,
             None => table
                 .entries()
@@ -200,9 +208,13 @@ impl SceneBuilder {
         ));
         self.recipe.add_material(entry.name, desc);
         self.features.push(desc.features());
-        if let Some(slots) = &desc.textures {
-            self.textures.extend(slots.iter().map(|(_, t)| t.clone()));
-        }
+        let slots = desc.textures.as_ref();
+        self.textures.push(match slots {
+            Some(slots) if named.is_some() || slots.are_filtered(desc.base_color) => {
+                slots.iter().map(|(_, t)| t.clone()).collect()
+            }
+            _ => Vec::new(),
+        });
         Ok(MaterialId(self.materials.len() as u32 - 1))
     }
 
@@ -263,15 +275,24 @@ impl SceneBuilder {
             materials.push(m);
             material_names.push(name);
         }
+        let mut used = vec![false; materials.len()];
+        for o in &geometry.objects {
+            used[o.material.index()] = true;
+        }
+        let textures = self.textures.into_iter().zip(used);
+        let textures = textures.filter(|(_, used)| *used);
+        let textures = textures.flat_map(|(own, _)| own).collect();
         let matte = materials.iter().map(|m| m.matte()).collect();
+        let refracts = materials.iter().map(|m| m.traits().refracts).collect();
         Ok(Scene {
             choose_light: LightChoice::new(&lights),
             geometry: Arc::new(geometry),
             materials,
+            refracts,
             matte,
             material_names,
             material_features: self.features,
-            textures: self.textures,
+            textures,
             parallelograms: lights.iter().map(|l| l.parallelogram()).collect(),
             lights,
             light_names,

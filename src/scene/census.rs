@@ -1,7 +1,8 @@
 //! What a scene holds: the counts that the survey of effects and `inspect` read.
 
 use super::Scene;
-use crate::geometry::Shape;
+use crate::cameras::CameraDesc;
+use crate::geometry::{ObjectId, Shape};
 use crate::materials::{Features, MaterialTraits};
 
 /// Counts of what is in a scene.
@@ -27,6 +28,8 @@ pub struct Census {
     pub traits: MaterialTraits,
     /// Objects whose material reflects like a mirror or transmits.
     pub specular_objects: usize,
+    /// Those of them that a light may reach, by its range.
+    pub lit_specular_objects: usize,
     /// Those of them that do so [sharply](MaterialTraits::is_sharp).
     pub sharp_objects: usize,
     /// Lights without extent.
@@ -56,7 +59,7 @@ impl Census {
             }
         }
         let mut used = vec![false; scene.materials.len()];
-        for o in &g.objects {
+        for (i, o) in g.objects.iter().enumerate() {
             c.instances += usize::from(o.placement.is_some());
             match g.shape(o.shape) {
                 Shape::Mesh(m) => c.placed_triangles += m.indices.len() as u64,
@@ -65,7 +68,10 @@ impl Census {
             used[o.material.index()] = true;
             let material = scene.material(o.material);
             let t = material.traits();
-            c.specular_objects += usize::from(t.reflects || t.transmits);
+            if t.reflects || t.transmits {
+                c.specular_objects += 1;
+                c.lit_specular_objects += usize::from(lit(scene, ObjectId(i as u32)));
+            }
             c.sharp_objects += usize::from(t.is_sharp());
             c.absorbs |= material.interior().is_some();
             c.traits = MaterialTraits {
@@ -82,7 +88,8 @@ impl Census {
         c.materials = used.iter().filter(|u| **u).count();
         let all = scene.material_features.iter().zip(&used);
         c.material_features = all.filter(|(_, used)| **used).map(|(f, _)| *f).collect();
-        c.lenses = scene.cameras.iter().filter(|c| c.lens.is_some()).count();
+        let wide = |c: &&CameraDesc| c.lens.is_some_and(|lens| lens.radius > 0.0);
+        c.lenses = scene.cameras.iter().filter(wide).count();
         for (_, kind) in &scene.light_names {
             match c.lights.iter_mut().find(|(k, _)| k == kind) {
                 Some((_, n)) => *n += 1,
@@ -91,4 +98,19 @@ impl Census {
         }
         c
     }
+}
+
+/// Whether some light may reach an object: none of a limited range does that is farther away.
+fn lit(scene: &Scene, id: ObjectId) -> bool {
+    scene.lights.iter().any(|light| {
+        let at = match light.is_delta() && light.range() < f64::INFINITY {
+            true => light.sample_origin([0.5; 2]).map(|from| from.p),
+            false => None,
+        };
+        at.is_none_or(|at| {
+            let around = scene.bounding_sphere(id);
+            let distance = (at - around.center).length() - around.radius;
+            distance < light.range() * (1.0 + 1e-6)
+        })
+    })
 }

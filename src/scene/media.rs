@@ -14,7 +14,6 @@
 use std::sync::Arc;
 
 use crate::accel::{ACCELERATORS, Accelerator};
-use crate::color::Rgb;
 use crate::error::Result;
 use crate::geometry::{Geometry, ObjectId, Ray, Shape, SurfacePoint, TriangleMesh};
 use crate::materials::{Bsdf, Interior, Medium};
@@ -207,11 +206,10 @@ impl Media {
         }
     }
 
-    /// Share of the light that survives a segment, if it ran in one of these bodies.
+    /// What absorbs light on a segment, if it ran in one of these bodies.
     #[inline]
-    pub(super) fn transmittance(&self, crossing: &Crossing, sp: &SurfacePoint) -> Option<Rgb> {
-        let interior = self.bodies[crossing.before.top()?].interior?;
-        Some(interior.transmittance(sp.distance))
+    pub(super) fn interior(&self, crossing: &Crossing) -> Option<Interior> {
+        self.bodies[crossing.before.top()?].interior
     }
 
     /// Whether the object is one of these bodies.

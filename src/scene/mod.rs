@@ -23,8 +23,9 @@ use crate::geometry::{
     Footprint, Geometry, LightId, MaterialId, ObjectId, Ray, ScenePatches, Surface, SurfacePoint,
 };
 use crate::lights::{LiSample, Light, Parallelogram};
-use crate::materials::{Bsdf, Features, Material, Matte, TransportMode};
+use crate::materials::{Bsdf, Features, Interior, Material, Matte, TransportMode};
 use crate::math::{Aabb, BoundingSphere, DVec3};
+use crate::stats::tally::{self, Event, Part};
 use crate::textures::Texture;
 
 /// Everything that is rendered.
@@ -35,11 +36,14 @@ pub struct Scene {
     pub materials: Vec<Box<dyn Material>>,
     /// What each of them has beyond a plain surface.
     pub material_features: Vec<Features>,
+    /// Whether each of them bends the light that it transmits.
+    refracts: Vec<bool>,
     /// Reflectance of those that are [matte](Material::matte).
     pub matte: Vec<Option<Rgb>>,
     /// Names of the materials, for reports.
     pub material_names: Vec<String>,
-    /// The textures of all materials. Without any, nobody needs footprints.
+    /// The textures of all materials that some object uses and that average over what a sample
+    /// sees. Without any, nobody needs footprints.
     pub textures: Vec<Texture>,
     /// Lights, named by [`LightId`].
     pub lights: Vec<Box<dyn Light>>,
@@ -79,6 +83,12 @@ impl Scene {
     #[inline]
     pub fn material(&self, id: MaterialId) -> &dyn Material {
         &*self.materials[id.index()]
+    }
+
+    /// Whether a material bends the light that it transmits.
+    #[inline]
+    pub fn bends(&self, id: MaterialId) -> bool {
+        self.refracts[id.index()]
     }
 
     /// The light named `id`.
@@ -239,10 +249,13 @@ impl Scene {
     /// inside an absorbing body (Beer–Lambert).
     #[inline(always)]
     pub fn transmittance(&self, sp: &SurfacePoint, crossing: &Crossing) -> Option<Rgb> {
+        if cfg!(dualight_without = "absorption") {
+            return None;
+        }
         if let Some(media) = &self.media
             && (media.knows(sp.object) || crossing.beyond(false) != Inside::default())
         {
-            return media.transmittance(crossing, sp);
+            return absorbed(media.interior(crossing)?, sp);
         }
         if sp.front {
             return None;
@@ -253,8 +266,7 @@ impl Scene {
     /// The rare part of the above, kept out of the loops that it is asked from.
     #[inline(never)]
     fn interior_transmittance(&self, sp: &SurfacePoint) -> Option<Rgb> {
-        let interior = self.material(sp.material).interior()?;
-        Some(interior.transmittance(sp.distance))
+        absorbed(self.material(sp.material).interior()?, sp)
     }
 
     /// As [`Geometry::surface_point`].
@@ -262,4 +274,11 @@ impl Scene {
     pub fn surface_point(&self, ray: &Ray, hit: &crate::geometry::Hit) -> SurfacePoint {
         self.geometry.surface_point(ray, hit)
     }
+}
+
+/// What a body leaves of the light on a segment through it.
+fn absorbed(interior: Interior, sp: &SurfacePoint) -> Option<Rgb> {
+    let _scope = tally::enter(Part::Absorption);
+    tally::count(Event::Attenuations);
+    Some(interior.transmittance(sp.distance))
 }

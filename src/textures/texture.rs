@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{Content, Image, Sampler};
 use crate::geometry::Surface;
+use crate::stats::tally::{self, Event};
 
 /// An affine map of texture coordinates (`KHR_texture_transform`).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +89,7 @@ impl Texture {
     /// per pixel to the right and down; without one the value is that of the point alone. What
     /// is not a number counts as 0.
     pub fn lookup(&self, uv: [f64; 2], footprint: Option<[[f64; 2]; 2]>) -> [f64; 4] {
+        tally::count(Event::TextureLookups);
         let [u, v] = self.transform.map_or(uv, |t| t.apply(uv));
         // Near the image, so that integers hold the coordinates however far out they were.
         let uv = [self.sampler.wrap_u.fold(u), self.sampler.wrap_v.fold(v)];

@@ -81,6 +81,7 @@ impl Bvh {
         let find = |tmin| test(prim, ray, search, tmin);
         let at = &self.geometry.objects[object as usize];
         match &at.coverage {
+            _ if cfg!(dualight_without = "alpha") => find(search.tmin),
             None => find(search.tmin),
             Some(coverage) => {
                 let shape = self.geometry.shape(at.shape);

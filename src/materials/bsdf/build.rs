@@ -102,18 +102,20 @@ impl Bsdf {
     /// Adds a lobe; it is picked in proportion to its albedo. A black lobe is left out.
     #[inline]
     pub fn push(&mut self, lobe: impl LobeModel + Into<Lobe>) {
-        self.push_in(lobe, FrameId::MAIN);
+        self.push_in(lobe, FrameId::MAIN, 0);
     }
 
-    /// As [`push`](Self::push), in one of the frames.
+    /// As [`push`](Self::push), in one of the frames; `events` are
+    /// [counted](crate::stats::tally::lobe) whenever it is evaluated.
     #[inline]
-    pub fn push_in(&mut self, lobe: impl LobeModel + Into<Lobe>, frame: FrameId) {
+    pub fn push_in(&mut self, lobe: impl LobeModel + Into<Lobe>, frame: FrameId, events: u32) {
         let pick = lobe.importance(self.view(frame).wo);
         let entry = Entry {
             lobe: lobe.into(),
             pick,
             frame,
             under: self.covers.len() as u8,
+            events,
         };
         if pick > 0.0 {
             let full = self.lobes.try_push(entry).is_err();

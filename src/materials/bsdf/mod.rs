@@ -6,9 +6,11 @@
 //! can partition path space by class.
 
 mod build;
+mod entry;
 mod matte;
 mod scattering;
 
+use entry::Entry;
 pub use matte::Matte;
 pub use scattering::Scattering;
 
@@ -97,17 +99,6 @@ impl FrameId {
 struct View {
     frame: Frame,
     wo: DVec3,
-}
-
-/// A lobe of the stack.
-#[derive(Clone, Debug)]
-struct Entry {
-    lobe: Lobe,
-    /// Its share of the samples, times [`Bsdf::total`].
-    pick: f64,
-    frame: FrameId,
-    /// The first of the layers above it.
-    under: u8,
 }
 
 /// The scattering function at one point, seen from one direction.
@@ -321,6 +312,7 @@ impl Bsdf {
             if !self.sides_agree(wi, local) {
                 continue;
             }
+            let _scope = e.tell();
             let (f, pdf) = e.lobe.eval(wo, local);
             if f.is_black() {
                 continue;
@@ -360,6 +352,7 @@ impl Bsdf {
                 let view = self.view(e.frame);
                 let local = view.frame.to_local(wi);
                 if self.sides_agree(wi, local) {
+                    let _scope = e.tell();
                     sum += e.lobe.eval(view.wo, local).0 * self.uncovered(e.under, wi);
                 }
             }
@@ -383,6 +376,7 @@ impl Bsdf {
                 return None;
             }
             let view = self.view(e.frame);
+            let _scope = e.tell();
             for s in e.lobe.branches(view.wo) {
                 let wi = view.frame.to_world(s.wi);
                 if !self.sides_agree(wi, s.wi) || s.weight.is_black() {
@@ -445,6 +439,7 @@ impl Bsdf {
             // Within the lobe, what is left of u_lobe is uniform again.
             u_in = (rest / chosen.pick).clamp(0.0, 1.0 - f64::EPSILON);
         }
+        let _scope = chosen.tell();
         let lobe = &chosen.lobe;
         let view = self.view(chosen.frame);
         let scattered = lobe
