@@ -37,8 +37,8 @@ type Input = (DVec3, DVec3);
 
 const N: usize = 4096;
 
-/// Median nanoseconds per input, each contestant once per round.
-fn race<T>(repeats: usize, inputs: &[T], fs: &[(&str, &dyn Fn(&T) -> f64)]) -> Vec<f64> {
+/// Nanoseconds per input, each contestant once per round; prints the medians.
+fn race<T>(repeats: usize, inputs: &[T], fs: &[(&str, &dyn Fn(&T) -> f64)]) -> Vec<Vec<f64>> {
     let mut times = vec![Vec::new(); fs.len()];
     for _ in 0..repeats {
         for (k, (_, f)) in fs.iter().enumerate() {
@@ -51,15 +51,23 @@ fn race<T>(repeats: usize, inputs: &[T], fs: &[(&str, &dyn Fn(&T) -> f64)]) -> V
             times[k].push(start.elapsed().as_secs_f64() * 1e9 / inputs.len() as f64);
         }
     }
-    let median = |t: &mut Vec<f64>| {
-        t.sort_by(f64::total_cmp);
-        t[t.len() / 2]
-    };
-    let out: Vec<f64> = times.iter_mut().map(median).collect();
-    for ((name, _), ns) in fs.iter().zip(&out) {
-        println!("  {name:<34} {ns:7.2} ns  {:5.2}", ns / out[0]);
+    for ((name, _), t) in fs.iter().zip(&times) {
+        let (ns, first) = (quartiles(t.clone())[1], quartiles(times[0].clone())[1]);
+        println!("  {name:<34} {ns:7.2} ns  {:5.2}", ns / first);
     }
-    out
+    times
+}
+
+/// Lower quartile, median and upper quartile.
+fn quartiles(mut x: Vec<f64>) -> [f64; 3] {
+    x.sort_by(f64::total_cmp);
+    [1, 2, 3].map(|q| x[x.len() * q / 4])
+}
+
+/// How many times as long one contestant takes as another, round by round.
+fn ratio(slow: &[f64], fast: &[f64]) -> String {
+    let [lo, mid, hi] = quartiles(slow.iter().zip(fast).map(|(a, b)| a / b).collect());
+    format!("{mid:.2} [{lo:.2}, {hi:.2}]")
 }
 
 fn gradient_sum(d: Dual<f64, 3>) -> f64 {
@@ -139,11 +147,12 @@ fn main() {
             }),
         ],
     );
-    println!(
-        "the library with an invalid state takes {:.2} times as long on the sphere, {:.2} on the triangle",
-        s[3] / s[1],
-        t[3] / t[1]
-    );
+    for (name, times) in [("sphere", &s), ("triangle", &t)] {
+        println!("{name}, in times of ours, median [quartiles]:");
+        println!("  the plain scalar     {}", ratio(&times[0], &times[1]));
+        println!("  the library          {}", ratio(&times[2], &times[1]));
+        println!("  with an invalid state {}", ratio(&times[3], &times[1]));
+    }
 
     for (name, geometry, from) in [
         ("scenes/box.gltf", box_scene(), DVec3::new(0.1, 0.9, 0.05)),

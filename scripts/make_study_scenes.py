@@ -6,6 +6,8 @@
 caustics.glb  a ring of gold and a goblet of glass, as meshes, under a small lamp
 interior.glb  a room that light reaches through a window only, everything diffuse
 textured.glb  bricks and tiles: colours, roughness and bumps from images
+speck.glb     the box with a glass ball one hundredth as wide
+cup.glb       the box with a goblet of glass, as a mesh, for the glass ball
 
 Standard library only; the same files every time.
 """
@@ -16,6 +18,7 @@ import struct
 import zlib
 from pathlib import Path
 
+import make_box_scenes
 from make_box_scenes import FLOAT, U32, Buffer, lambert, quad, write_glb
 
 
@@ -255,12 +258,32 @@ def textured():
     return s.buffer, s.document(looking((0.3, 1.5, 4.2), (-0.05, 0.7, 0.0), 36))
 
 
+def speck():
+    buffer, doc = make_box_scenes.scene(12, 24, analytic=True)
+    ball = next(n for n in doc["nodes"] if n["name"] == "glass ball")
+    radius = make_box_scenes.RADIUS / 100
+    ball.update(translation=[0.6, radius - 1, 0.3], extras={"sphere_radius": radius})
+    return buffer, doc
+
+
+def cup():
+    buffer, doc = make_box_scenes.scene(12, 24, analytic=True)
+    ball = next(n for n in doc["nodes"] if n["name"] == "glass ball")
+    del ball["extras"]
+    ball.update(name="goblet", translation=[0.6, -0.998, 0.3])
+    mesh = doc["meshes"][ball["mesh"]]
+    mesh["name"] = "goblet"
+    mesh["primitives"][0].update(revolved(buffer, goblet(), 128))
+    doc["buffers"][0]["byteLength"] = len(buffer.data)
+    return buffer, doc
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("."), metavar="FOLDER")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
-    for make in (caustics, interior, textured):
+    for make in (caustics, interior, textured, speck, cup):
         write_glb(folder / f"{make.__name__}.glb", *make())
 
 

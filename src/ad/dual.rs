@@ -8,35 +8,28 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::Real;
 
-/// What is known of the derivatives; of two operands the later one counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum State {
-    /// They are zero. Most operands of an intersection are constants (a centre, a corner, the
-    /// light's position); the compiler sees it, and half of the work goes.
-    Constant,
-    /// They exist.
-    Varies,
-    /// They do not.
-    Invalid,
-}
-
 /// A value with its partial derivatives by `N` inputs.
 ///
 /// Values are computed by the same operations, in the same order, as on the plain scalar, so every
 /// branch is taken as it would be there. Where an operation has no derivative (a root at zero, a
 /// division by zero, a branch point), the number keeps its value and becomes *invalid*: from then
-/// on, [`gradient`](Self::gradient) of everything computed from it is `None`. A NaN instead would
-/// make comparisons quietly false.
+/// on, [`gradient`](Self::gradient) of everything computed from it is `None`. The value never
+/// becomes NaN for that, which would make comparisons quietly false.
 ///
-/// Everything is inlined by force: only then does the compiler see which operands are constants,
-/// and without that an intersection takes twice as long.
+/// Everything is inlined by force: only then does the compiler see which derivatives are zero, and
+/// without that an intersection takes twice as long.
 ///
 /// `T` may be a dual number again; the derivatives then have derivatives of their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dual<T, const N: usize> {
     re: T,
+    /// Invalid derivatives are infinite or NaN, and stay so: finite numbers times them, and added
+    /// to them, make nothing finite. So what does not exist is never tested for on the way.
     eps: [T; N],
-    state: State,
+    /// Which derivatives may be other than zero: none of a constant (a centre, a corner, the
+    /// light's position), one of an input. It follows from how a number was made and never from
+    /// values, so that the compiler knows, and most of the work on the first products goes.
+    varies: [bool; N],
 }
 
 impl<T: Real, const N: usize> Dual<T, N> {
@@ -46,14 +39,18 @@ impl<T: Real, const N: usize> Dual<T, N> {
         Self {
             re,
             eps,
-            state: State::Varies,
+            varies: [true; N],
         }
     }
 
     /// Input number `i`, whose derivative by itself is one.
     #[inline(always)]
     pub fn variable(re: T, i: usize) -> Self {
-        Self::new(re, from_fn(|k| T::constant(f64::from(u8::from(k == i)))))
+        Self {
+            re,
+            eps: from_fn(|k| T::constant(f64::from(u8::from(k == i)))),
+            varies: from_fn(|k| k == i),
+        }
     }
 
     /// The value as the scalar it was computed in.
@@ -65,9 +62,14 @@ impl<T: Real, const N: usize> Dual<T, N> {
     /// The derivatives; `None` where they do not exist, or are too large for the scalar.
     #[inline(always)]
     pub fn gradient(&self) -> Option<[T; N]> {
-        let finite = self.eps.iter().all(|e| e.re().is_finite());
-        let valid = self.state != State::Invalid;
-        (valid && self.re.re().is_finite() && finite).then_some(self.eps)
+        // Zero times a finite number is zero, times another it is NaN: one comparison for all.
+        let mut nothing = 0.0 * self.re.re();
+        for k in 0..N {
+            if self.varies[k] {
+                nothing += 0.0 * self.eps[k].re();
+            }
+        }
+        (nothing == 0.0).then_some(self.eps)
     }
 
     /// The linear forecast `f + ∇f·h` (the paper's equation 1).
@@ -77,37 +79,47 @@ impl<T: Real, const N: usize> Dual<T, N> {
         Some((0..N).fold(self.re, |sum, k| sum + g[k] * h[k]))
     }
 
-    /// `re` with derivatives made from those of `self` by the factor `slope`.
+    /// `re` with each derivative of `self` by `f`.
     #[inline(always)]
-    fn chain(self, re: T, slope: T) -> Self {
+    fn each(self, re: T, f: impl Fn(T) -> T) -> Self {
+        let eps = from_fn(|k| {
+            if self.varies[k] {
+                f(self.eps[k])
+            } else {
+                self.eps[k]
+            }
+        });
+        Self { re, eps, ..self }
+    }
+
+    /// `re` with derivatives made from those of two numbers: by `both`, or by `left` or `right`
+    /// where one of the two is zero.
+    #[inline(always)]
+    fn join(
+        self,
+        o: Self,
+        re: T,
+        left: impl Fn(T) -> T,
+        right: impl Fn(T) -> T,
+        both: impl Fn(T, T) -> T,
+    ) -> Self {
+        let eps = from_fn(|k| match (self.varies[k], o.varies[k]) {
+            (false, false) => self.eps[k],
+            (true, false) => left(self.eps[k]),
+            (false, true) => right(o.eps[k]),
+            (true, true) => both(self.eps[k], o.eps[k]),
+        });
         Self {
             re,
-            eps: self.each(|e| e * slope),
-            state: self.state,
+            eps,
+            varies: from_fn(|k| self.varies[k] | o.varies[k]),
         }
     }
 
-    /// The derivatives, each by `f`; those of a constant are zero without any work.
+    /// Whether it is a constant.
     #[inline(always)]
-    fn each(self, f: impl Fn(T) -> T) -> [T; N] {
-        match self.state {
-            State::Constant => self.eps,
-            _ => self.eps.map(f),
-        }
-    }
-
-    /// The derivatives of a function of two numbers with these partial derivatives.
-    #[inline(always)]
-    fn join(self, o: Self, re: T, by_self: T, by_o: T) -> Self {
-        match (self.state, o.state) {
-            (State::Constant, _) => o.chain(re, by_o),
-            (_, State::Constant) => self.chain(re, by_self),
-            (a, b) => Self {
-                re,
-                eps: from_fn(|k| self.eps[k] * by_self + o.eps[k] * by_o),
-                state: a.max(b),
-            },
-        }
+    fn is_constant(&self) -> bool {
+        !self.varies.iter().fold(false, |any, v| any | v)
     }
 }
 
@@ -115,13 +127,7 @@ impl<T: Real, const N: usize> Add for Dual<T, N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        let (re, state) = (self.re + o.re, self.state.max(o.state));
-        let eps = match (self.state, o.state) {
-            (State::Constant, _) => o.eps,
-            (_, State::Constant) => self.eps,
-            _ => from_fn(|k| self.eps[k] + o.eps[k]),
-        };
-        Self { re, eps, state }
+        self.join(o, self.re + o.re, |a| a, |b| b, |a, b| a + b)
     }
 }
 
@@ -129,13 +135,7 @@ impl<T: Real, const N: usize> Sub for Dual<T, N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        let (re, state) = (self.re - o.re, self.state.max(o.state));
-        let eps = match (self.state, o.state) {
-            (_, State::Constant) => self.eps,
-            (State::Constant, _) => o.each(|e| -e),
-            _ => from_fn(|k| self.eps[k] - o.eps[k]),
-        };
-        Self { re, eps, state }
+        self.join(o, self.re - o.re, |a| a, |b| -b, |a, b| a - b)
     }
 }
 
@@ -143,7 +143,8 @@ impl<T: Real, const N: usize> Mul for Dual<T, N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        self.join(o, self.re * o.re, o.re, self.re)
+        let (u, v) = (self.re, o.re);
+        self.join(o, u * v, |a| a * v, |b| b * u, |a, b| a * v + b * u)
     }
 }
 
@@ -152,8 +153,10 @@ impl<T: Real, const N: usize> Div for Dual<T, N> {
     #[inline(always)]
     fn div(self, o: Self) -> Self {
         let (re, inv) = (self.re / o.re, T::constant(1.0) / o.re);
-        let out = self.join(o, re, inv, -re * inv);
-        if o.re.re() == 0.0 {
+        let by_o = -re * inv;
+        let out = self.join(o, re, |a| a * inv, |b| b * by_o, |a, b| (a - re * b) * inv);
+        // By zero, the factors are infinite and leave no derivative finite but a constant's.
+        if out.is_constant() && o.re.re() == 0.0 {
             out.branch_point()
         } else {
             out
@@ -165,11 +168,7 @@ impl<T: Real, const N: usize> Neg for Dual<T, N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self {
-            re: -self.re,
-            eps: self.each(|e| -e),
-            state: self.state,
-        }
+        self.each(-self.re, |e| -e)
     }
 }
 
@@ -179,7 +178,7 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
         Self {
             re: T::constant(x),
             eps: [T::constant(0.0); N],
-            state: State::Constant,
+            varies: [false; N],
         }
     }
 
@@ -191,33 +190,31 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.re.sqrt();
-        let out = self.chain(root, T::constant(0.5) / root);
-        if self.re.re() > 0.0 {
-            out
-        } else {
+        let slope = T::constant(0.5) / root;
+        let out = self.each(root, |e| e * slope);
+        // At zero, the slope is infinite and leaves no derivative finite but a constant's.
+        if self.is_constant() && !(self.re.re() > 0.0) {
             out.branch_point()
+        } else {
+            out
         }
     }
 
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (s, c) = self.re.sin_cos();
-        (self.chain(s, c), self.chain(c, -s))
+        (self.each(s, |x| x * c), self.each(c, |x| -x * s))
     }
 
     #[inline(always)]
     fn exp(self) -> Self {
         let e = self.re.exp();
-        self.chain(e, e)
+        self.each(e, |x| x * e)
     }
 
     #[inline(always)]
     fn scale(self, s: f64) -> Self {
-        Self {
-            re: self.re.scale(s),
-            eps: self.each(|e| e.scale(s)),
-            state: self.state,
-        }
+        self.each(self.re.scale(s), |e| e.scale(s))
     }
 
     #[inline(always)]
@@ -231,10 +228,7 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
 
     #[inline(always)]
     fn branch_point(self) -> Self {
-        Self {
-            state: State::Invalid,
-            ..self
-        }
+        Self::new(self.re, [T::constant(f64::NAN); N])
     }
 
     #[inline(always)]
@@ -261,6 +255,7 @@ mod tests {
             Some([9f64.cos() * 6.0, 0.0])
         );
         assert_eq!((u * v).forecast([0.5, -1.0]), Some(6.0 + 1.0 - 3.0));
+        assert_eq!((u / (u * v)).gradient(), Some([0.0, -0.25]));
     }
 
     #[test]
@@ -275,6 +270,15 @@ mod tests {
         assert_eq!((D::constant(1.0) / zero).gradient(), None);
         assert_eq!(zero.abs().gradient(), None);
         assert_eq!((-D::constant(1.0)).sqrt().gradient(), None);
+        // A constant that is infinite, or no number, has none either, nor has what follows.
+        let pole = D::constant(1.0) / D::constant(0.0);
+        assert_eq!((D::constant(1.0) / pole).gradient(), None);
+        assert_eq!(D::constant(0.0).sqrt().gradient(), None);
+        // Each derivative for itself: by what does not vary, a root at zero has none all the same.
+        let both = D::new(0.0, [0.0, 1.0]).sqrt();
+        assert_eq!((both.value(), both.gradient()), (0.0, None));
+        assert_eq!((both * both - both).gradient(), None);
+        assert_eq!(zero.branch_point().forecast([0.0; 2]), None);
         // Overflow of a derivative alone.
         let steep = D::new(1.0, [1e200, 0.0]) * D::constant(1e200);
         assert_eq!((steep.value(), steep.gradient()), (1e200, None));

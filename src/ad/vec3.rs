@@ -73,7 +73,11 @@ impl V3<Dual<f64, 3>> {
     /// The vector `v` as three inputs: its own derivative is the unit matrix.
     #[inline(always)]
     pub fn variable(v: DVec3) -> Self {
-        Self::with_derivatives(v, DVec3::AXES)
+        Self {
+            x: Dual::variable(v.x, 0),
+            y: Dual::variable(v.y, 1),
+            z: Dual::variable(v.z, 2),
+        }
     }
 }
 

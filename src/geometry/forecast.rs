@@ -57,16 +57,12 @@ impl SphereForecast {
         // Three derivatives, by the coordinates of what moves. Each way on its own, so that the
         // compiler knows of every number whether it varies.
         let dual: Dual<f64, 3> = match moves {
-            Moves::Target => line_sphere(V3::constant(o), V3::variable(d), center, r).discriminant,
-            Moves::Ray => line_sphere(V3::variable(o), V3::constant(d), center, r).discriminant,
+            Moves::Target => line_sphere(V3::constant(o), V3::variable(d), center, r).polynomial,
+            Moves::Ray => line_sphere(V3::variable(o), V3::constant(d), center, r).polynomial,
         };
-        let discriminant = dual.value();
-        let mut gradient = DVec3::from_array(dual.gradient()?);
         let inv_dd = 1.0 / d.dot(d);
-        if moves == Moves::Target {
-            // The polynomial is D times |d|², which changes with the target too.
-            gradient += d * (2.0 * discriminant * inv_dd);
-        }
+        let discriminant = dual.value() * inv_dd;
+        let gradient = DVec3::from_array(dual.gradient()?) * inv_dd;
         Some(Self {
             discriminant,
             gradient,

@@ -19,8 +19,10 @@ pub struct LineSphere<R> {
     pub discriminant: R,
     /// Parameter of the point of the line closest to the centre.
     pub t_closest: R,
-    /// `|d|²`.
-    dd: R,
+    /// The discriminant times `|d|²`, a polynomial in `d` and, for parallel lines, in `o`.
+    pub polynomial: R,
+    /// `1/|d|²`.
+    inv_dd: R,
     /// `−f·d`, with `f = o − c`.
     b: R,
     /// `(|f| − r)(|f| + r)`.
@@ -36,9 +38,10 @@ pub fn line_sphere<R: Real>(o: V3<R>, d: V3<R>, center: DVec3, r: f64) -> LineSp
     let f = o - V3::constant(center);
     let dd = d.dot(d);
     let b = -f.dot(d);
-    let t_closest = b / dd;
-    let perp = f + d * t_closest;
-    let inv_r2 = R::constant(1.0 / (r * r));
+    let inv_dd = R::constant(1.0) / dd;
+    // Its length is that of the perpendicular times |d|; as that, it does not cancel.
+    let moment = f.cross(d);
+    let polynomial = dd - moment.dot(moment) * R::constant(1.0 / (r * r));
     let radius = R::constant(r);
     let ff = f.dot(f);
     // At the centre |f| = 0, where a square root has no derivative; r² − |f|² is exact there.
@@ -49,9 +52,10 @@ pub fn line_sphere<R: Real>(o: V3<R>, d: V3<R>, center: DVec3, r: f64) -> LineSp
         -(radius * radius)
     };
     LineSphere {
-        discriminant: R::constant(1.0) - perp.dot(perp) * inv_r2,
-        t_closest,
-        dd,
+        discriminant: polynomial * inv_dd,
+        polynomial,
+        t_closest: b * inv_dd,
+        inv_dd,
         b,
         c,
         r,
@@ -65,7 +69,7 @@ impl<R: Real> LineSphere<R> {
         if !(self.discriminant.re() >= 0.0) {
             return None;
         }
-        let mut root = (self.discriminant * self.dd).sqrt() * R::constant(self.r);
+        let mut root = self.polynomial.sqrt() * R::constant(self.r);
         if self.discriminant.re() < TANGENT {
             root = root.branch_point();
         }
@@ -78,7 +82,7 @@ impl<R: Real> LineSphere<R> {
         if q.re() == 0.0 {
             return Some([self.t_closest, self.t_closest]);
         }
-        let (t0, t1) = (self.c / q, q / self.dd);
+        let (t0, t1) = (self.c * (R::constant(1.0) / q), q * self.inv_dd);
         Some(if t0.re() <= t1.re() {
             [t0, t1]
         } else {

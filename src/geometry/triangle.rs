@@ -42,12 +42,12 @@ pub fn plane_hit<R: Real>(
     if det.re() * det.re() < GRAZING * GRAZING * d.re().length_squared() * n.re().length_squared() {
         inv = inv.branch_point();
     }
+    // The direction comes last: as long as only it varies, all before it are constants.
     let s = o - V3::constant(v0);
-    let m = s.cross(d) * inv;
     Some(PlaneHit {
         t: s.dot(n) * inv,
-        b1: V3::constant(e2).dot(m),
-        b2: -V3::constant(e1).dot(m),
+        b1: d.dot(V3::constant(e2).cross(s)) * inv,
+        b2: d.dot(s.cross(V3::constant(e1))) * inv,
     })
 }
 

@@ -102,7 +102,9 @@ impl Checked {
     #[inline(always)]
     pub fn gradient(self) -> Option<[f64; 3]> {
         let g = Oracle(self.0).gradient();
-        (self.1 && self.0.re.is_finite() && g.iter().all(|x| x.is_finite())).then_some(g)
+        // As ours does it.
+        let nothing = g.iter().fold(0.0 * self.0.re, |sum, x| sum + 0.0 * x);
+        (self.1 && nothing == 0.0).then_some(g)
     }
 }
 
