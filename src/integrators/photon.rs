@@ -225,7 +225,8 @@ impl PhotonMapping<'_> {
                 }
             }
             let u = sampler.next_2d();
-            let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
+            let u_lobe = sampler.next_1d();
+            let Some(s) = bsdf.sample_carried(beta, u_lobe, u, || sampler.next_1d()) else {
                 return;
             };
             if !cx.effects.follow(cx.scene, &sp, s.class, s.transmitted) {

@@ -6,9 +6,11 @@
 //! can partition path space by class.
 
 mod build;
+mod channels;
 mod matte;
 mod scattering;
 
+pub use channels::ChannelSamples;
 pub use matte::Matte;
 pub use scattering::Scattering;
 

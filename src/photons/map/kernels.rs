@@ -167,7 +167,7 @@ impl Pilot<'_> {
                         p: Vec3::from(photon.p),
                         ng: photon.ng(),
                     };
-                    let near = map.spread(&site, &mut found);
+                    let near = map.spread(&site, photon, &mut found);
                     let radius = (f64::from(near) * scale) as f32;
                     let radius = radius.clamp(super::LEAST * widest, widest);
                     // Photons in one place need to be counted once only.

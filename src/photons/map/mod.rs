@@ -161,12 +161,13 @@ impl PhotonMap {
     }
 
     /// Distance to the farthest of the wanted number of photons around a site, or as far as is
-    /// searched.
-    fn spread(&self, site: &Site, found: &mut Nearest) -> f32 {
+    /// searched. Those that have no channel in common with `like` are others.
+    fn spread(&self, site: &Site, like: &Photon, found: &mut Nearest) -> f32 {
         found.reset(self.nearest, self.max_radius * self.max_radius);
         let side = Side::new(site);
         self.tree.visit_near(site.p, found, |i, p, r2| {
-            side.accepts(p, self.photons[i].packed_ng(), r2)
+            let photon = &self.photons[i];
+            photon.shares_channel(like) && side.accepts(p, photon.packed_ng(), r2)
         });
         found.kernel().1.sqrt()
     }
