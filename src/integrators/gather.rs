@@ -222,7 +222,8 @@ impl PhotonMapping<'_> {
                 beta = beta / (1.0 - p);
                 bsdf.keep_specular();
             }
-            let Some(s) = bsdf.sample(sampler.next_1d(), sampler.next_2d()) else {
+            let (u_lobe, u) = (sampler.next_1d(), sampler.next_2d());
+            let Some(s) = bsdf.sample_carried(beta, u_lobe, u, || sampler.next_1d()) else {
                 return Rgb::ZERO;
             };
             let follows = cx.effects.follow(cx.scene, &sp, s.class, s.transmitted);

@@ -354,7 +354,9 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
             self.ask(w, sp, bsdf, u, lights);
         }
         let u = w.sampler.next_2d();
-        let Some(s) = bsdf.sample(w.sampler.next_1d(), u) else {
+        let u_lobe = w.sampler.next_1d();
+        let sampler = &mut w.sampler;
+        let Some(s) = bsdf.sample_carried(w.beta, u_lobe, u, || sampler.next_1d()) else {
             return false;
         };
         let Some(follows) = cx.effects.follow(cx.scene, sp, s.class, s.transmitted) else {

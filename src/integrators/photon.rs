@@ -242,7 +242,8 @@ impl PhotonMapping<'_> {
                 }
             }
             let u = sampler.next_2d();
-            let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
+            let u_lobe = sampler.next_1d();
+            let Some(s) = bsdf.sample_carried(beta, u_lobe, u, || sampler.next_1d()) else {
                 return;
             };
             let Some(follows) = cx.effects.follow(cx.scene, &sp, s.class, s.transmitted) else {

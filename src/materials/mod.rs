@@ -29,7 +29,9 @@ mod mirror;
 mod pbr;
 mod unlit;
 
-pub use bsdf::{Bsdf, BsdfSample, BsdfValue, FrameId, Matte, Scattering, TransportMode};
+pub use bsdf::{
+    Bsdf, BsdfSample, BsdfValue, ChannelSamples, FrameId, Matte, Scattering, TransportMode,
+};
 pub use desc::{AlphaMode, Brushing, Interior, MaterialDesc, MaterialTraits, Medium};
 pub use features::Features;
 pub use filmed::FacetFilm;

@@ -62,6 +62,13 @@ impl Photon {
         PackedNormal(self.ng)
     }
 
+    /// Whether some channel is lit by both: behind glass that disperses, photons of one colour
+    /// say nothing of the others.
+    #[inline]
+    pub(super) fn shares_channel(&self, o: &Self) -> bool {
+        (0..3).any(|k| self.power[k] > 0.0 && o.power[k] > 0.0)
+    }
+
     /// Flux in W.
     #[inline]
     pub fn power(&self) -> Rgb {

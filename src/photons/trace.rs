@@ -1,17 +1,21 @@
 //! Following photons through the scene.
 
+use arrayvec::ArrayVec;
+
 use super::emit::{PhotonSource, Purpose};
 use super::in_order::in_order;
 use super::ledger::Ledger;
 use super::photon::{Photon, PhotonClass};
 use super::{EmittedPhoton, PhotonSettings};
 use crate::accel::Accelerator;
+use crate::color::Rgb;
 use crate::control::Control;
 use crate::effects::EffectSet;
+use crate::geometry::Ray;
 use crate::lights::range_window;
 use crate::materials::{Bsdf, BsdfSample, LobeClass, TransportMode};
 use crate::sampling::{Rng, hash2, stream};
-use crate::scene::Scene;
+use crate::scene::{Inside, Scene};
 use crate::stats::tally::{self, Event, Part};
 use crate::stats::{PhotonCounts, RayCounts};
 
@@ -104,6 +108,22 @@ pub fn follow_photons(
     }
 }
 
+/// A photon on its way.
+#[derive(Clone)]
+struct Flight {
+    ray: Ray,
+    power: Rgb,
+    class: PhotonClass,
+    inside: Inside,
+    /// Number of the surface that comes next, from 1 on.
+    depth: u32,
+    rng: Rng,
+}
+
+/// Colours that wait until the one before them has come to its end. They part once for all: a
+/// photon of one channel stays one.
+type Parted = ArrayVec<Flight, 2>;
+
 struct Tracer<'a> {
     scene: &'a Scene,
     accel: &'a dyn Accelerator,
@@ -119,94 +139,141 @@ impl Tracer<'_> {
             Purpose::Global => stream::GLOBAL_PHOTONS,
             Purpose::Caustic => stream::CAUSTIC_PHOTONS,
         };
-        let mut rng = Rng::new(hash2(hash2(self.settings.seed, key), !index));
+        let first = Flight {
+            ray: photon.ray,
+            power: photon.power,
+            class: PhotonClass::Direct,
+            inside: self.scene.enclosing(photon.ray.origin()),
+            depth: 1,
+            rng: Rng::new(hash2(hash2(self.settings.seed, key), !index)),
+        };
+        out.ledger.emitted += first.power;
+        let mut parted = Parted::new();
+        let mut flight = Some(first);
+        while let Some(mut one) = flight {
+            while self.advance(&mut one, photon.range, out, &mut parted) {}
+            flight = parted.pop();
+        }
+    }
+
+    /// Takes a photon to the next surface and in a new direction. Whether it goes on. Where its
+    /// colours part, the others are left in `parted`.
+    #[inline(always)]
+    fn advance(&self, at: &mut Flight, range: f64, out: &mut Batch, parted: &mut Parted) -> bool {
         let max_depth = self.settings.max_depth.unwrap_or(DEPTH_GUARD);
-        let mut ray = photon.ray;
-        let mut power = photon.power;
-        let mut class = PhotonClass::Direct;
-        let mut inside = self.scene.enclosing(ray.origin());
-        out.ledger.emitted += power;
-        for depth in 1.. {
-            out.segments += 1;
-            let Some(hit) = self.accel.intersect(&ray) else {
-                out.ledger.escaped += power;
-                return;
-            };
-            let sp = self.scene.surface_point(&ray, &hit);
-            if depth == 1 && photon.range < f64::INFINITY {
-                let left = power * range_window(sp.distance, photon.range);
-                out.ledger.absorbed += power - left;
-                power = left;
-            }
-            let crossing = self.scene.crossing(inside, &sp);
-            if let Some(t) = self.scene.transmittance(&sp, &crossing) {
-                let left = power * t;
-                out.ledger.absorbed += power - left;
-                power = left;
-            }
-            let mut bsdf = Bsdf::new(&sp, TransportMode::Importance);
-            self.scene.scatter(&sp, None, &mut bsdf);
-            crossing.apply(&mut bsdf);
-            if bsdf.has_diffuse() {
-                let ng = if sp.front { sp.ng } else { -sp.ng };
-                let photon = Photon::new(sp.p, sp.wo, ng, power, class);
-                match (self.purpose, class) {
-                    (Purpose::Global, _) | (Purpose::Caustic, PhotonClass::Caustic) => {
-                        out.photons.push(photon);
-                    }
-                    (Purpose::Caustic, PhotonClass::Indirect) => out.glow.push(photon),
-                    (Purpose::Caustic, PhotonClass::Direct) => {}
+        out.segments += 1;
+        let Some(hit) = self.accel.intersect(&at.ray) else {
+            out.ledger.escaped += at.power;
+            return false;
+        };
+        let sp = self.scene.surface_point(&at.ray, &hit);
+        if at.depth == 1 && range < f64::INFINITY {
+            let left = at.power * range_window(sp.distance, range);
+            out.ledger.absorbed += at.power - left;
+            at.power = left;
+        }
+        let crossing = self.scene.crossing(at.inside, &sp);
+        if let Some(t) = self.scene.transmittance(&sp, &crossing) {
+            let left = at.power * t;
+            out.ledger.absorbed += at.power - left;
+            at.power = left;
+        }
+        let mut bsdf = Bsdf::new(&sp, TransportMode::Importance);
+        self.scene.scatter(&sp, None, &mut bsdf);
+        crossing.apply(&mut bsdf);
+        if bsdf.has_diffuse() {
+            let ng = if sp.front { sp.ng } else { -sp.ng };
+            let photon = Photon::new(sp.p, sp.wo, ng, at.power, at.class);
+            match (self.purpose, at.class) {
+                (Purpose::Global, _) | (Purpose::Caustic, PhotonClass::Caustic) => {
+                    out.photons.push(photon);
                 }
-                // A caustic photon needs a specular surface before its first diffuse one, and
-                // stops at its second.
-                if self.purpose == Purpose::Caustic && class != PhotonClass::Caustic {
-                    if !bsdf.has_specular() {
-                        out.ledger.cut += power;
-                        out.ledger.discarded += u64::from(class == PhotonClass::Direct);
-                        return;
-                    }
-                    bsdf.keep_specular();
+                (Purpose::Caustic, PhotonClass::Indirect) => out.glow.push(photon),
+                (Purpose::Caustic, PhotonClass::Direct) => {}
+            }
+            // A caustic photon needs a specular surface before its first diffuse one, and
+            // stops at its second.
+            if self.purpose == Purpose::Caustic && at.class != PhotonClass::Caustic {
+                if !bsdf.has_specular() {
+                    out.ledger.cut += at.power;
+                    out.ledger.discarded += u64::from(at.class == PhotonClass::Direct);
+                    return false;
                 }
+                bsdf.keep_specular();
             }
-            if depth >= max_depth {
-                out.ledger.cut += power;
-                return;
-            }
-            let Some(s) = bsdf.sample(rng.next_1d(), rng.next_2d()) else {
-                out.ledger.absorbed += power;
-                return;
-            };
-            let follow = |s: &BsdfSample| {
-                self.effects
-                    .follow(self.scene, &sp, s.class, s.transmitted)
-                    .is_some()
-            };
-            if !follow(&s) {
-                out.ledger.absorbed += power;
-                return;
-            }
-            let mut weight = s.weight;
-            if self.settings.roulette {
-                let survive = weight.max_channel().min(1.0);
-                if rng.next_1d() >= survive {
-                    out.ledger.absorbed += power;
-                    return;
-                }
-                weight = weight / survive;
-            }
-            let next = power * weight;
-            out.ledger.absorbed += power - next;
-            power = next;
-            if power.is_black() {
-                return;
-            }
-            class = match (class, s.class) {
+        }
+        if at.depth >= max_depth {
+            out.ledger.cut += at.power;
+            return false;
+        }
+        let (u_lobe, u) = (at.rng.next_1d(), at.rng.next_2d());
+        let live = |s: &BsdfSample| {
+            let followed = self.effects.follow(self.scene, &sp, s.class, s.transmitted);
+            followed.is_some()
+        };
+        let leave = |at: &mut Flight, s: &BsdfSample| {
+            at.class = match (at.class, s.class) {
                 (_, LobeClass::Diffuse) => PhotonClass::Indirect,
                 (PhotonClass::Indirect, _) => PhotonClass::Indirect,
                 _ => PhotonClass::Caustic,
             };
-            ray = sp.spawn(s.wi);
-            inside = crossing.beyond(s.transmitted);
+            at.ray = sp.spawn(s.wi);
+            at.inside = crossing.beyond(s.transmitted);
+            at.depth += 1;
+        };
+        if bsdf.disperses() {
+            let before = at.power;
+            // All go on by the same numbers: what does not part stays together.
+            let chance = at.rng.next_1d();
+            let here = at.clone();
+            let (mut on, mut went_on) = (false, Rgb::ZERO);
+            let ways = bsdf.sample_channels(before, u_lobe, u);
+            for s in ways.iter().filter(|s| live(s)) {
+                let survive = self.survival(s);
+                let power = before * s.weight / survive;
+                if chance >= survive || power.is_black() {
+                    continue;
+                }
+                went_on += power;
+                let mut one = here.clone();
+                one.power = power;
+                leave(&mut one, s);
+                if !std::mem::replace(&mut on, true) {
+                    *at = one;
+                } else if parted.try_push(one).is_err() {
+                    debug_assert!(false, "more parts than channels");
+                }
+            }
+            out.ledger.absorbed += before - went_on;
+            return on;
+        }
+        let Some(s) = bsdf.sample(u_lobe, u).filter(live) else {
+            out.ledger.absorbed += at.power;
+            return false;
+        };
+        let mut weight = s.weight;
+        if self.settings.roulette {
+            let survive = self.survival(&s);
+            if at.rng.next_1d() >= survive {
+                out.ledger.absorbed += at.power;
+                return false;
+            }
+            weight = weight / survive;
+        }
+        let next = at.power * weight;
+        out.ledger.absorbed += at.power - next;
+        at.power = next;
+        leave(at, &s);
+        !next.is_black()
+    }
+
+    /// Chance of a photon to go on.
+    #[inline]
+    fn survival(&self, s: &BsdfSample) -> f64 {
+        if self.settings.roulette {
+            s.weight.max_channel().min(1.0)
+        } else {
+            1.0
         }
     }
 }

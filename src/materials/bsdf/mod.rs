@@ -6,10 +6,12 @@
 //! can partition path space by class.
 
 mod build;
+mod channels;
 mod entry;
 mod matte;
 mod scattering;
 
+pub use channels::ChannelSamples;
 use entry::Entry;
 pub use matte::Matte;
 pub use scattering::Scattering;

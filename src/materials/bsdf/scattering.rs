@@ -14,6 +14,17 @@ pub trait Scattering {
     fn eval(&self, wi: DVec3, weight: impl Fn(f64) -> f64) -> BsdfValue;
     /// As [`Bsdf::sample`].
     fn sample(&self, u_lobe: f64, u: [f64; 2]) -> Option<BsdfSample>;
+    /// As [`Bsdf::sample_carried`]; what does not disperse has no use for what is carried.
+    #[inline(always)]
+    fn sample_carried(
+        &self,
+        _carried: Rgb,
+        u_lobe: f64,
+        u: [f64; 2],
+        _choose: impl FnOnce() -> f64,
+    ) -> Option<BsdfSample> {
+        self.sample(u_lobe, u)
+    }
     /// As [`Bsdf::diffuse_f`].
     fn diffuse_f(&self, wi: DVec3) -> Rgb;
     /// As [`Bsdf::has_finite`].
@@ -37,6 +48,17 @@ impl Scattering for Bsdf {
     #[inline(always)]
     fn sample(&self, u_lobe: f64, u: [f64; 2]) -> Option<BsdfSample> {
         Self::sample(self, u_lobe, u)
+    }
+
+    #[inline(always)]
+    fn sample_carried(
+        &self,
+        carried: Rgb,
+        u_lobe: f64,
+        u: [f64; 2],
+        choose: impl FnOnce() -> f64,
+    ) -> Option<BsdfSample> {
+        Self::sample_carried(self, carried, u_lobe, u, choose)
     }
 
     #[inline]

@@ -86,6 +86,24 @@ pub trait LobeModel {
 const NO_BORDER: f64 = 1e-4;
 
 impl Lobe {
+    /// Share of the surface that is this lobe's interface, by channel; all for what parts no
+    /// media.
+    #[inline]
+    pub(in crate::materials) fn share(&self) -> Rgb {
+        match self {
+            Self::SmoothDielectric(facet) => facet.share,
+            Self::GgxDielectric(lobe) => lobe.facet.share,
+            _ => Rgb::ONE,
+        }
+    }
+
+    /// Whether it serves one channel only, as those of glass that disperses.
+    #[inline]
+    pub(in crate::materials) fn is_of_one_channel(&self) -> bool {
+        let Rgb { r, g, b } = self.share();
+        [r, g, b].iter().filter(|c| **c > 0.0).count() == 1
+    }
+
     /// Multiplies the relative index of a lobe that refracts; by 0, light passes straight.
     pub(in crate::materials) fn immerse(&mut self, correction: f64) {
         let (facet, rough) = match self {

@@ -22,6 +22,11 @@ const EYE: f64 = 0.1;
 /// How far is looked, in kernel radii: a disc around another point nearby must fit in.
 const REACH: f64 = 2.0;
 
+/// Cosine to the normal, and height over the plane in kernel radii, up to which a surface is flat:
+/// it makes no difference to a kernel of how much of a plane a photon is counted.
+const EVEN: f64 = 0.9999;
+const LEVEL: f64 = 0.02;
+
 /// Steps of the search for a border; each halves its uncertainty.
 const BISECTIONS: u32 = 5;
 
@@ -36,6 +41,18 @@ struct Sight {
     distance: f64,
     /// The obstacle's normal in the tangent plane, towards the eye.
     wall: Option<DVec2>,
+    /// Whether the surface where sight ends lies in the tangent plane.
+    flat: bool,
+}
+
+/// What is around a site within the reach of its kernels.
+pub(super) enum Outlook {
+    /// The surface goes on, and is flat.
+    Flat,
+    /// The surface goes on, but bends.
+    Bent,
+    /// The surface ends, or something stands on it.
+    Limited(Clearing),
 }
 
 /// A star-shaped polygon in the tangent plane of a site: a part of what can be seen and stood on.
@@ -46,7 +63,7 @@ pub(super) struct Clearing {
 }
 
 impl Clearing {
-    fn look(around: Surroundings<'_>, site: &Site, radius: f32) -> Option<Self> {
+    fn look(around: Surroundings<'_>, site: &Site, radius: f32) -> Outlook {
         let view = Look {
             around,
             p: site.p.as_dvec3(),
@@ -55,9 +72,14 @@ impl Clearing {
         };
         let reach = REACH * view.radius;
         // Every other direction tells whether it is worth looking closely.
-        let open = |k: &usize| view.along(COMPASS[*k]).distance >= reach;
-        if (0..DIRECTIONS).step_by(2).all(|k| open(&k)) {
-            return None;
+        let mut flat = true;
+        let mut open = |k: usize| {
+            let sight = view.along(COMPASS[k]);
+            flat &= sight.flat;
+            sight.distance >= reach
+        };
+        if (0..DIRECTIONS).step_by(2).all(&mut open) {
+            return if flat { Outlook::Flat } else { Outlook::Bent };
         }
         let sights: [Sight; DIRECTIONS] = std::array::from_fn(|k| view.along(COMPASS[k]));
         let sectors = std::array::from_fn(|k| {
@@ -75,7 +97,7 @@ impl Clearing {
                 [a.distance as f32, b.distance as f32]
             }
         });
-        Some(Self { sectors })
+        Outlook::Limited(Self { sectors })
     }
 
     fn corners(&self, k: usize) -> [DVec2; 2] {
@@ -194,9 +216,8 @@ pub struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    /// Looks around a site; `None` if nothing ends or blocks the surface within the reach of
-    /// kernels of this radius.
-    pub(super) fn look(self, site: &Site, radius: f32) -> Option<Clearing> {
+    /// Looks around a site, as far as kernels of this radius reach.
+    pub(super) fn look(self, site: &Site, radius: f32) -> Outlook {
         Clearing::look(self, site, radius)
     }
 }
@@ -219,6 +240,7 @@ impl Look<'_> {
         let mut sight = Sight {
             distance: reach,
             wall: None,
+            flat: false,
         };
         let ray = Ray {
             tmax: reach as f32,
@@ -240,11 +262,13 @@ impl Look<'_> {
         }
         // Close before an obstacle there may be a gap, not more.
         let end = sight.distance * (1.0 - 1e-3);
-        if !self.ground(d, end) {
+        if let Some(flat) = self.ground(d, end) {
+            sight.flat = flat;
+        } else {
             let (mut on, mut off) = (0.0, end);
             for _ in 0..BISECTIONS {
                 let middle = 0.5 * (on + off);
-                if self.ground(d, middle) {
+                if self.ground(d, middle).is_some() {
                     on = middle;
                 } else {
                     off = middle;
@@ -253,22 +277,25 @@ impl Look<'_> {
             sight = Sight {
                 distance: on,
                 wall: None,
+                flat: false,
             };
         }
         sight
     }
 
-    /// Whether the surface goes on at this distance.
-    fn ground(&self, d: DVec3, distance: f64) -> bool {
+    /// Whether the surface goes on at this distance, and if so, whether it lies in the tangent
+    /// plane there.
+    fn ground(&self, d: DVec3, distance: f64) -> Option<bool> {
         let height = f64::from(FLATNESS) * self.radius.max(distance);
         let ray = Ray {
             tmax: (2.0 * height) as f32,
             ..Ray::new(self.p + d * distance + self.n * height, -self.n)
         };
-        self.around.accel.intersect(&ray).is_some_and(|hit| {
-            let on = self.around.scene.surface_point(&ray, &hit);
-            on.ng.dot(self.n).abs() >= f64::from(NORMAL_AGREEMENT)
-        })
+        let hit = self.around.accel.intersect(&ray)?;
+        let on = self.around.scene.surface_point(&ray, &hit);
+        let cos = on.ng.dot(self.n).abs();
+        let flat = cos > EVEN && (on.distance - height).abs() < LEVEL * self.radius;
+        (cos >= f64::from(NORMAL_AGREEMENT)).then_some(flat)
     }
 }
 

@@ -11,7 +11,8 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::clearing::{Clearing, Plane, Surroundings};
+use super::clearing::{Clearing, Outlook, Plane, Surroundings};
+use super::ground::Ground;
 use super::nearest::Closest;
 use super::{KdTree, Limits, Nearest, PackedNormal, PhotonMap, Side, Site};
 use crate::control::Control;
@@ -29,29 +30,52 @@ const THINNING: f32 = 1.0 / 64.0;
 pub struct Kernel<'a> {
     /// Radius in metres.
     pub radius: f32,
+    /// The site that has looked around, unless all is flat there.
+    from: Option<Site>,
     /// What limits it.
-    plane: Option<(&'a Clearing, Vec3, Vec3)>,
+    clearing: Option<&'a Clearing>,
 }
 
 impl<'a> Kernel<'a> {
-    /// A disc around `site`, limited by what was seen from there.
-    pub(super) fn around(site: &Site, radius: f32, clearing: Option<&'a Clearing>) -> Self {
+    /// A disc, of which nothing more is known.
+    pub(super) fn disc(radius: f32) -> Self {
         Self {
             radius,
-            plane: clearing.map(|c| (c, site.p, site.ng)),
+            from: None,
+            clearing: None,
+        }
+    }
+
+    /// A disc near `site`, on the ground that was seen from there.
+    pub(super) fn seen(site: &Site, radius: f32, outlook: &'a Outlook) -> Self {
+        match outlook {
+            Outlook::Flat => Self::disc(radius),
+            Outlook::Bent => Self::on_ground(site, radius, None),
+            Outlook::Limited(clearing) => Self::on_ground(site, radius, Some(clearing)),
+        }
+    }
+
+    fn on_ground(site: &Site, radius: f32, clearing: Option<&'a Clearing>) -> Self {
+        Self {
+            radius,
+            from: Some(*site),
+            clearing,
         }
     }
 
     #[inline]
     pub(super) fn plane(&self) -> Option<Plane<'a>> {
-        self.plane.map(|(c, p, ng)| Plane::new(c, p, ng))
+        let from = self.from?;
+        self.clearing.map(|c| Plane::new(c, from.p, from.ng))
     }
 
-    /// The surface whose tangent plane the kernel's area is measured in, if that is not the one
-    /// of the site where it serves.
+    /// The surface whose tangent plane the area of this kernel at a place is measured in, if that
+    /// may be another than the one of the place itself.
     #[inline]
-    pub(super) fn ground(&self) -> Option<Side> {
-        self.plane.map(|(_, p, ng)| Side::new(&Site { p, ng }))
+    pub(super) fn ground(&self, at: Vec3) -> Option<Ground> {
+        let ground = Ground::new(&self.from?, self.radius);
+        // A place above the ground lies on something else, which nobody has looked at.
+        (self.clearing.is_some() || ground.supports(at)).then_some(ground)
     }
 }
 
@@ -60,21 +84,30 @@ impl<'a> Kernel<'a> {
 pub(super) struct Decision {
     ng: PackedNormal,
     radius: f32,
-    /// Index of its clearing; open if there is none.
+    /// Index of its clearing; [`OPEN`] or [`BENT`] if there is none.
     clearing: u32,
 }
 
+/// Nothing ends or blocks the surface, which is flat.
 const OPEN: u32 = u32::MAX;
+
+/// Nothing ends or blocks the surface, but it bends.
+const BENT: u32 = u32::MAX - 1;
 
 /// How far from its site a kernel with a clearing may serve, in radii: its corners lie within
 /// twice the radius, and no point is as high above as it is far.
 const FARTHEST: f32 = 2.0 * std::f32::consts::SQRT_2;
 
 impl Decision {
+    #[inline]
+    fn is_limited(&self) -> bool {
+        self.clearing < BENT
+    }
+
     /// Squared distance from the site up to which the kernel may serve.
     #[inline]
     fn limit(&self) -> f32 {
-        let reach = if self.clearing == OPEN {
+        let reach = if !self.is_limited() {
             self.radius
         } else {
             FARTHEST * self.radius
@@ -123,18 +156,18 @@ impl Pilot<'_> {
         let map = PhotonMap::build(photons, PILOT_NEAREST, area);
         let scale = (self.nearest as f64 / (PILOT_NEAREST as f64 * self.ratio)).sqrt();
         let widest = (super::REACH * even) as f32;
-        let decided: Vec<(Vec3, Decision, Option<Clearing>)> = map
+        let decided: Vec<(Vec3, Decision, Outlook)> = map
             .photons()
             .par_chunks(1024)
             .flat_map_iter(|chunk| {
                 let mut found = Nearest::new();
-                let mut part: Vec<(Vec3, Decision, Option<Clearing>)> = Vec::new();
+                let mut part: Vec<(Vec3, Decision, Outlook)> = Vec::new();
                 for photon in chunk {
                     let site = Site {
                         p: Vec3::from(photon.p),
                         ng: photon.ng(),
                     };
-                    let near = map.spread(&site, &mut found);
+                    let near = map.spread(&site, photon, &mut found);
                     let radius = (f64::from(near) * scale) as f32;
                     let radius = radius.clamp(super::LEAST * widest, widest);
                     // Photons in one place need to be counted once only.
@@ -144,13 +177,13 @@ impl Pilot<'_> {
                     }) {
                         continue;
                     }
-                    let clearing = self.around.look(&site, radius);
+                    let outlook = self.around.look(&site, radius);
                     let decision = Decision {
                         ng: photon.packed_ng(),
                         radius,
                         clearing: OPEN,
                     };
-                    part.push((site.p, decision, clearing));
+                    part.push((site.p, decision, outlook));
                 }
                 stage.advance(chunk.len() as u64);
                 part
@@ -159,10 +192,14 @@ impl Pilot<'_> {
         let mut clearings = Vec::new();
         let mut sites: Vec<(Vec3, Decision)> = decided
             .into_iter()
-            .map(|(p, mut decision, clearing)| {
-                if let Some(c) = clearing {
-                    decision.clearing = clearings.len() as u32;
-                    clearings.push(c);
+            .map(|(p, mut decision, outlook)| {
+                match outlook {
+                    Outlook::Flat => {}
+                    Outlook::Bent => decision.clearing = BENT,
+                    Outlook::Limited(c) => {
+                        decision.clearing = clearings.len() as u32;
+                        clearings.push(c);
+                    }
                 }
                 (p, decision)
             })
@@ -215,9 +252,11 @@ impl Kernels {
     /// The kernel decided at a site of a number.
     pub fn at(&self, i: usize) -> Kernel<'_> {
         let decision = &self.decisions[i];
+        if decision.clearing == OPEN {
+            return Kernel::disc(decision.radius);
+        }
         let clearing = self.clearings.get(decision.clearing as usize);
-        let radius = decision.radius;
-        Kernel::around(&self.site(i), radius, clearing)
+        Kernel::on_ground(&self.site(i), decision.radius, clearing)
     }
 
     /// The nearest site on the same side of the same surface that has looked at what lies around
@@ -236,7 +275,7 @@ impl Kernels {
                 // Twice the radius is open, so that all of a kernel here is, too.
                 site.p.distance_squared(p) <= d.limit()
                     && side.accepts(p, d.ng, r * r)
-                    && (d.clearing == OPEN
+                    && (!d.is_limited()
                         || self
                             .at(i)
                             .plane()

@@ -1,12 +1,14 @@
 //! Photon maps: photons in a tree, and what is estimated from them.
 
 mod clearing;
+mod ground;
 mod irradiance;
 mod kdtree;
 mod kernels;
 mod nearest;
 mod saved;
 
+use clearing::Outlook;
 pub use clearing::Surroundings;
 pub use irradiance::{IrradianceMap, IrradianceSample};
 pub use kdtree::{KdTree, Limits, Search, Within};
@@ -159,12 +161,13 @@ impl PhotonMap {
     }
 
     /// Distance to the farthest of the wanted number of photons around a site, or as far as is
-    /// searched.
-    fn spread(&self, site: &Site, found: &mut Nearest) -> f32 {
+    /// searched. Those that have no channel in common with `like` are others.
+    fn spread(&self, site: &Site, like: &Photon, found: &mut Nearest) -> f32 {
         found.reset(self.nearest, self.max_radius * self.max_radius);
         let side = Side::new(site);
         self.tree.visit_near(site.p, found, |i, p, r2| {
-            side.accepts(p, self.photons[i].packed_ng(), r2)
+            let photon = &self.photons[i];
+            photon.shares_channel(like) && side.accepts(p, photon.packed_ng(), r2)
         });
         found.kernel().1.sqrt()
     }
@@ -204,16 +207,16 @@ impl PhotonMap {
         }
         // In the dark, or in a nook: only if there are photons, their surroundings are looked at.
         let radius = kernels.radius(site);
-        let bare = self.estimate_within(site, Kernel::around(site, radius, None), &keep, &f);
+        let bare = self.estimate_within(site, Kernel::disc(radius), &keep, &f);
         if bare.density == 0.0 {
             return bare;
         }
         match around.look(site, radius) {
-            Some(clearing) => {
-                let kernel = Kernel::around(site, radius, Some(&clearing));
+            Outlook::Flat => bare,
+            outlook => {
+                let kernel = Kernel::seen(site, radius, &outlook);
                 self.estimate_within(site, kernel, keep, f)
             }
-            None => bare,
         }
     }
 
@@ -222,7 +225,8 @@ impl PhotonMap {
     /// A kernel's area is that of a disc in a plane, and photons count that lie over it, close to
     /// the plane. On what is tilted against it, where the surface bends, they lie closer together
     /// over the disc than on the surface, and count by so much less. Close to an edge the plane is
-    /// perhaps that of the surface beyond, on which photons count as well as on this one.
+    /// perhaps that of the surface beyond, on which photons count as well as on this one. Where a
+    /// surface bends, they count on all of it that the site of the kernel saw, as the area does.
     #[inline]
     pub fn estimate_within(
         &self,
@@ -236,11 +240,14 @@ impl PhotonMap {
         let disc = PI * r * r;
         let (mut sum, mut counted) = (Rgb::ZERO, 0u32);
         let side = Side::new(site);
-        let ground = kernel.ground();
-        let flat = ground.as_ref().unwrap_or(&side);
+        let ground = kernel.ground(site.p);
+        let flat = ground.as_ref().map_or(&side, |g| &g.side);
         let r2 = kernel.radius * kernel.radius;
         // What lies over the rim, as high as it may.
-        let reach2 = r2 * (1.0 + FLATNESS * FLATNESS);
+        let reach2 = match &ground {
+            None => r2 * (1.0 + FLATNESS * FLATNESS),
+            Some(ground) => ground.reach(site.p),
+        };
         let mut search = Within(reach2, |i: usize| {
             let photon = &self.photons[i];
             sum += f(photon.wi()) * photon.power() * flat.seen(photon.packed_ng());
@@ -248,10 +255,10 @@ impl PhotonMap {
         });
         self.tree.visit_near(site.p, &mut search, |i, p, _| {
             let photon = &self.photons[i];
-            let on = |s: &Side| s.accepts(p, photon.packed_ng(), r2);
+            let ng = photon.packed_ng();
             keep(photon.class)
                 && flat.over(site.p, p, r2)
-                && (on(&side) || ground.as_ref().is_some_and(on))
+                && (side.accepts(p, ng, r2) || ground.as_ref().is_some_and(|g| g.accepts(p, ng)))
                 && plane.as_ref().is_none_or(|c| c.contains(p))
         });
         if counted == 0 {
