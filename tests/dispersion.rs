@@ -217,7 +217,8 @@ fn no_tint_is_left_as_dispersion_tends_to_none() {
         for mode in [PATH, DIRECT_MAP, GATHER] {
             let of = |dispersion: f64, seeds: u64| {
                 let scene = ball_on_floor(dispersion, roughness, 1.0);
-                let images: Vec<Image> = (0..16)
+                let n = if mode.integrator == "path" { 24 } else { 12 };
+                let images: Vec<Image> = (0..n)
                     .map(|s| render(&scene, mode, SMALL, seeds + s))
                     .collect();
                 [0, 1, 2].map(|k| Samples(images.iter().map(|i| channel_mean(i, k)).collect()))
