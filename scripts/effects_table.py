@@ -2,7 +2,7 @@
 """Makes the tables of scenes and effects in docs/effects.md.
 
     cargo build --release
-    scripts/effects_table.py [--repeats N] [--size WxH] [--spp N] SCENE...
+    scripts/effects_table.py [--repeats N] [--size WxH] [--spp N] [--matte-box] SCENE...
 
 Each scene is rendered as the survey decides and with every effect forced, by turns, N times each;
 what is compared is the time of the processor. From the statistics of the first run of either come
@@ -20,7 +20,23 @@ import sys
 import tempfile
 from pathlib import Path
 
-BINARY = Path(__file__).resolve().parent.parent / "target/release/dualight"
+ROOT = Path(__file__).resolve().parent.parent
+BINARY = ROOT / "target/release/dualight"
+
+
+def matte_box(folder):
+    """The box with every surface matte: nothing in it calls for more than direct and indirect light."""
+    scene = json.loads((ROOT / "scenes/box.gltf").read_text())
+    for material in scene["materials"]:
+        extensions = material.setdefault("extensions", {})
+        for name in [name for name in extensions if name != "KHR_materials_emissive_strength"]:
+            del extensions[name]
+        extensions["KHR_materials_specular"] = {"specularFactor": 0.0}
+        values = material.setdefault("pbrMetallicRoughness", {})
+        values.update({"metallicFactor": 0.0, "roughnessFactor": 1.0})
+    path = Path(folder) / "matte_box.gltf"
+    path.write_text(json.dumps(scene))
+    return path
 
 
 def render(scene, effects, arguments, folder):
@@ -88,16 +104,18 @@ def row(scene, integrator, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--matte-box", action="store_true", help="also scenes/box.gltf with every surface matte")
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--size", default="128x128")
     parser.add_argument("--spp", type=int, default=16)
     options = parser.parse_args()
     rows = []
-    for scene in options.scenes:
-        for integrator in ["path", "photon"]:
-            rows.append(row(scene, integrator, options))
-            print(f"{scene} by {integrator}: done", file=sys.stderr)
+    with tempfile.TemporaryDirectory() as folder:
+        for scene in options.scenes + ([matte_box(folder)] if options.matte_box else []):
+            for integrator in ["path", "photon"]:
+                rows.append(row(scene, integrator, options))
+                print(f"{scene} by {integrator}: done", file=sys.stderr)
     print("| scene | integrator | on: share of time, counts | off | off counted 0 |\n|---|---|---|---|---|")
     for detected, _, _ in rows:
         print(detected)
