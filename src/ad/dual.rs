@@ -116,6 +116,13 @@ impl<T: Real, const N: usize> Dual<T, N> {
         }
     }
 
+    /// The product.
+    #[inline(always)]
+    fn times(self, o: Self) -> Self {
+        let (u, v) = (self.re, o.re);
+        self.join(o, u * v, |a| a * v, |b| b * u, |a, b| a * v + b * u)
+    }
+
     /// Whether it is a constant.
     #[inline(always)]
     fn is_constant(&self) -> bool {
@@ -144,8 +151,7 @@ impl<T: Real, const N: usize> Mul for Dual<T, N> {
     #[expect(clippy::suspicious_arithmetic_impl, reason = "the product rule")]
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        let (u, v) = (self.re, o.re);
-        self.join(o, u * v, |a| a * v, |b| b * u, |a, b| a * v + b * u)
+        self.times(o)
     }
 }
 
