@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""What adaptive emission gains: noise of each layer times processor seconds, against uniform emission.
+"""What adaptive emission, or adaptive pixels, gain: noise of each layer times processor seconds.
 
-    scripts/emission_gain.py SCENE [--seeds 10] [--size 64x64] [OPTIONS OF dualight render ...]
+    scripts/adaptive_gain.py SCENE [--of emission|pixel-sampling] [--seeds 10] [--size 64x64]
+                             [OPTIONS OF dualight render ...]
 
-Both see the same photons and pixels but for the emission, seed by seed in turns; what neither tells
-from noise is the bias, which both share. Intervals are 95 % by the jackknife over seeds. Needs numpy
-and OpenEXR. DUALIGHT names the binary [target/release/dualight].
+Against uniform ones, all else alike, seed by seed in turns. It is of noise alone: emissions share
+their bias, but adaptive pixels interpolate, and what that blurs is not counted. Intervals are 95 % by the
+jackknife over seeds. Needs numpy and OpenEXR. DUALIGHT names the binary [target/release/dualight].
 """
 import argparse
 import os
@@ -47,6 +48,7 @@ def luminances(path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("scene")
+    parser.add_argument("--of", choices=["emission", "pixel-sampling"], default="emission")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--size", default="64x64")
     args, more = parser.parse_known_args()
@@ -58,7 +60,7 @@ def main():
         for seed in range(args.seeds):
             for name in names:
                 times[name].append(seconds(
-                    [binary, "render", args.scene, "--integrator", "photon", "--emission", name, "--size",
+                    [binary, "render", args.scene, "--integrator", "photon", "--" + args.of, name, "--size",
                      args.size, "--seed", str(seed), "--quiet", "-o", path] + more))
                 images[name].append(luminances(path))
     mean = np.mean([i[""] for n in names for i in images[n]], axis=0)
@@ -81,7 +83,8 @@ def main():
         error = np.sqrt((args.seeds - 1) / args.seeds * np.sum((each - np.mean(each))**2))
         low, high = np.exp(whole - 1.96 * error), np.exp(whole + 1.96 * error)
         less = noise(names[0], layer, every) / noise(names[1], layer, every)
-        print(f"{layer or 'picture':9} noise {less:.2f} times less, faster {np.exp(whole):.2f} [{low:.2f}, {high:.2f}]")
+        print(f"{layer or 'picture':9} noise {less:.2f} times less, "
+              f"faster {np.exp(whole):.2f} [{low:.2f}, {high:.2f}]")
 
 
 if __name__ == "__main__":
