@@ -199,8 +199,10 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
                 let w = &mut walkers[i];
                 scope.switch(w.part);
                 let sum = &mut sums[w.pixel];
-                met.next()
-                    .is_some_and(|sp| self.scatter(depth, w, sp, sum, &mut lights, scratch))
+                match met.next() {
+                    Some(sp) => self.scatter(depth, w, sp, sum, &mut lights, scratch),
+                    None => false,
+                }
             });
             scratch.rays.shadow += lights.len() as u64;
             scratch.rays.bounce += alive.len() as u64;
