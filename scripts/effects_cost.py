@@ -12,13 +12,14 @@ the clock. Backend `bvh`, one thread. What a group costs bounds what each of its
 The pictures of both must be the same. Takes some minutes for each build; needs valgrind.
 """
 import argparse
-import json
 import os
 import re
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from effects_table import changed_box
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -43,18 +44,13 @@ def build(without, target):
     return program
 
 
-def polished(folder):
-    """The box with walls of glossy plastic: a material of the general kind, with none of its layers."""
-    scene = json.loads((ROOT / "scenes/box.gltf").read_text())
-    for material in scene["materials"]:
-        transmits = "KHR_materials_transmission" in material.get("extensions", {})
-        if "emissiveFactor" not in material and not transmits:
-            material.pop("extensions", None)
-            values = material.setdefault("pbrMetallicRoughness", {})
-            values.update({"metallicFactor": 0.0, "roughnessFactor": 0.4})
-    path = Path(folder) / "polished_box.gltf"
-    path.write_text(json.dumps(scene))
-    return path
+def polished(material):
+    """A wall of glossy plastic: a material of the general kind, with none of its layers."""
+    transmits = "KHR_materials_transmission" in material.get("extensions", {})
+    if "emissiveFactor" not in material and not transmits:
+        material.pop("extensions", None)
+        values = material.setdefault("pbrMetallicRoughness", {})
+        values.update({"metallicFactor": 0.0, "roughnessFactor": 0.4})
 
 
 def instructions(program, scene, integrator, folder):
@@ -88,7 +84,7 @@ def main():
     groups = options.group or GROUPS
     counted = {}
     with tempfile.TemporaryDirectory() as folder:
-        scenes = [ROOT / "scenes/box.gltf", polished(folder)]
+        scenes = [ROOT / "scenes/box.gltf", changed_box(folder, "polished", polished)]
         for group in groups:
             lean = build(group, target)
             for scene in scenes:

@@ -24,19 +24,24 @@ ROOT = Path(__file__).resolve().parent.parent
 BINARY = ROOT / "target/release/dualight"
 
 
-def matte_box(folder):
-    """The box with every surface matte: nothing in it calls for more than direct and indirect light."""
+def changed_box(folder, name, change):
+    """The box with some materials changed, as glTF: `change` takes each of them."""
     scene = json.loads((ROOT / "scenes/box.gltf").read_text())
     for material in scene["materials"]:
-        extensions = material.setdefault("extensions", {})
-        for name in [name for name in extensions if name != "KHR_materials_emissive_strength"]:
-            del extensions[name]
-        extensions["KHR_materials_specular"] = {"specularFactor": 0.0}
-        values = material.setdefault("pbrMetallicRoughness", {})
-        values.update({"metallicFactor": 0.0, "roughnessFactor": 1.0})
-    path = Path(folder) / "matte_box.gltf"
+        change(material)
+    path = Path(folder) / f"{name}_box.gltf"
     path.write_text(json.dumps(scene))
     return path
+
+
+def matte(material):
+    """A matte surface; with matte ones alone the box calls for no more than direct and indirect light."""
+    extensions = material.setdefault("extensions", {})
+    for name in [name for name in extensions if name != "KHR_materials_emissive_strength"]:
+        del extensions[name]
+    extensions["KHR_materials_specular"] = {"specularFactor": 0.0}
+    values = material.setdefault("pbrMetallicRoughness", {})
+    values.update({"metallicFactor": 0.0, "roughnessFactor": 1.0})
 
 
 def render(scene, effects, arguments, folder):
@@ -112,7 +117,7 @@ def main():
     options = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for scene in options.scenes + ([matte_box(folder)] if options.matte_box else []):
+        for scene in options.scenes + ([changed_box(folder, "matte", matte)] if options.matte_box else []):
             for integrator in ["path", "photon"]:
                 rows.append(row(scene, integrator, options))
                 print(f"{scene} by {integrator}: done", file=sys.stderr)

@@ -8,18 +8,17 @@ mod common;
 
 use std::f64::consts::{FRAC_PI_3, PI};
 
+use common::photons::caustic_photons;
 use common::render::{DIRECT_MAP, GATHER, Mode, PATH, Size, render};
 use common::stats::Samples;
 use common::{add_quad, add_sphere, glass, lambert, lamp};
 use dualight::accel::ACCELERATORS;
 use dualight::color::Rgb;
-use dualight::control::Control;
-use dualight::effects::EffectSet;
 use dualight::film::Image;
 use dualight::geometry::Ray;
 use dualight::materials::{Bsdf, BsdfSample, MaterialDesc, TransportMode, fresnel};
 use dualight::math::DVec3;
-use dualight::photons::{EMISSIONS, Photon, PhotonSettings, trace_photons};
+use dualight::photons::Photon;
 use dualight::scene::{Scene, SceneBuilder};
 
 /// Names of the channels.
@@ -32,24 +31,6 @@ fn dispersive(red: f64, blue: f64) -> MaterialDesc {
         dispersion: 0.5 * (blue - red) / (0.025 * (ior - 1.0)),
         ..glass(ior)
     }
-}
-
-/// Caustic photons of a scene.
-fn caustic_photons(scene: &Scene, seed: u64, n: u64) -> Vec<Photon> {
-    let backend = &ACCELERATORS[seed as usize % ACCELERATORS.len()];
-    let accel = (backend.build)(&scene.geometry, 2).expect("built");
-    let told = PhotonSettings {
-        seed,
-        global: 0,
-        caustic: n,
-        nearest: 50,
-        max_depth: None,
-        roulette: true,
-    };
-    let (all, control) = (EffectSet::all(), Control::default());
-    let maps = trace_photons(scene, &*accel, &EMISSIONS[0], all, &told, false, &control);
-    let map = maps.caustic.expect("something is specular");
-    map.photons().to_vec()
 }
 
 /// Where light of a channel goes that enters glass along a ray and is transmitted or reflected as
@@ -189,7 +170,7 @@ fn photons_of_glass_that_hardly_disperses_are_those_of_clear_glass() {
     for roughness in [0.0, 0.3] {
         let flux = |dispersion| {
             let scene = ball_on_floor(dispersion, roughness, 0.2);
-            let photons = caustic_photons(&scene, 3, 20_000);
+            let (photons, _) = caustic_photons(&scene, 3, 20_000);
             photons.iter().map(Photon::power).sum::<Rgb>()
         };
         let (clear, little) = (flux(0.0), flux(1e-7));

@@ -10,16 +10,15 @@ mod common;
 
 use std::f64::consts::PI;
 
+use common::photons::caustic_photons;
 use common::render::{DIRECT_MAP, Mode, PATH, Size, mean, render};
 use common::stats::Samples;
 use common::{add_disc, add_quad, add_sphere, glass, lambert, lamp, light, look_at, mirror};
 use dualight::accel::ACCELERATORS;
 use dualight::color::Rgb;
-use dualight::control::Control;
-use dualight::effects::EffectSet;
 use dualight::materials::{MaterialDesc, TransportMode, fresnel};
 use dualight::math::DVec3;
-use dualight::photons::{EMISSIONS, Photon, PhotonClass, PhotonSettings, trace_photons};
+use dualight::photons::Photon;
 use dualight::sampling::{Rng, hash2};
 use dualight::scene::{Scene, SceneBuilder};
 
@@ -36,32 +35,6 @@ fn scene(make: impl FnOnce(&mut SceneBuilder)) -> Scene {
     let mut b = SceneBuilder::default();
     make(&mut b);
     b.finish().expect("valid")
-}
-
-/// Caustic photons of a scene, and the flux that was aimed at specular objects.
-fn caustic_photons(scene: &Scene, seed: u64, n: u64) -> (Vec<Photon>, f64) {
-    let backend = &ACCELERATORS[seed as usize % ACCELERATORS.len()];
-    let accel = (backend.build)(&scene.geometry, 2).expect("built");
-    let told = PhotonSettings {
-        seed,
-        global: 0,
-        caustic: n,
-        nearest: 50,
-        max_depth: None,
-        roulette: true,
-    };
-    let (all, control) = (EffectSet::all(), Control::default());
-    let maps = trace_photons(scene, &*accel, &EMISSIONS[0], all, &told, false, &control);
-    let map = maps.caustic.expect("something is specular");
-    assert!(
-        map.photons()
-            .iter()
-            .all(|p| p.class == PhotonClass::Caustic)
-    );
-    (
-        map.photons().to_vec(),
-        maps.caustic_counts.flux_emitted / 3.0,
-    )
 }
 
 /// A pane 2 m wide with its front at `y = 0`, as two faces.

@@ -440,67 +440,7 @@ fn what_is_switched_off_is_not_followed() {
 
 /// A scene that has something of everything.
 fn everything(omit: Omit) -> Scene {
-    let mut b = SceneBuilder::default();
-    b.leave_out(omit);
-    let white = || {
-        let image = Image::from_texels(1, 1, 4, Texels::U8(vec![255; 4])).unwrap();
-        Some(Texture::new(Arc::new(image), Content::Data))
-    };
-    let textures = TextureSlots {
-        base_color: white(),
-        normal: white(),
-        normal_scale: 1.0,
-        ..Default::default()
-    };
-    let all = MaterialDesc {
-        metallic: 0.0,
-        alpha_mode: AlphaMode::Blend,
-        base_alpha: 0.5,
-        roughness: 0.2,
-        transmission: 0.5,
-        volume: true,
-        attenuation_distance: 1.0,
-        attenuation_color: Rgb::splat(0.5),
-        dispersion: 1.0,
-        clearcoat: 1.0,
-        sheen_color: Rgb::ONE,
-        iridescence: 1.0,
-        anisotropy: 0.5,
-        diffuse_transmission: 0.5,
-        textures: Some(Arc::new(textures)),
-        ..Default::default()
-    };
-    let id = b.add_material(&all).unwrap();
-    add_square(&mut b, id, DVec3::ZERO);
-    let shape = b.add_mesh(
-        TriangleMesh {
-            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            indices: vec![[0, 1, 2]],
-            uv_sets: vec![vec![[0.0; 2]; 3]],
-            ..Default::default()
-        },
-        "twice",
-    );
-    for z in [-2.0, -3.0] {
-        b.place(MeshPlacement {
-            shape,
-            material: id,
-            world_from_object: DAffine3::from_translation(DVec3::Z * z),
-            name: "twice".into(),
-        });
-    }
-    b.add_light(light("environment", DVec3::ZERO, DVec3::Y, 1.0));
-    b.add_camera(CameraDesc {
-        lens: Some(Lens {
-            radius: 0.1,
-            focus: 2.0,
-            blades: 0,
-            rotation: 0.0,
-            ratio: 1.0,
-        }),
-        ..camera(DVec3::new(0.0, 0.0, 2.5), 60.0)
-    });
-    b.finish().unwrap()
+    show::scene(Show::Everything, 1.0, omit)
 }
 
 /// What is left out is gone, the rest stays, and a wish that cannot be granted is refused.
@@ -530,12 +470,8 @@ fn every_effect_can_be_switched_off_or_says_why_not() {
                 continue;
             }
         };
-        // What needs another is gone with it: light needs the only light, bumps are images.
-        let needs = |name: &str| match e.name {
-            "textures" => name == "normals",
-            "environment" => ["direct", "caustics", "indirect"].contains(&name),
-            _ => false,
-        };
+        // What needs another is gone with it: bumps are images.
+        let needs = |name: &str| e.name == "textures" && name == "normals";
         let left: Vec<&str> = all
             .iter()
             .copied()

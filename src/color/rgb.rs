@@ -22,6 +22,13 @@ impl Rgb {
     /// One in every channel.
     pub const ONE: Self = Self::splat(1.0);
 
+    /// One in each channel alone.
+    pub const CHANNELS: [Self; 3] = [
+        Self::new(1.0, 0.0, 0.0),
+        Self::new(0.0, 1.0, 0.0),
+        Self::new(0.0, 0.0, 1.0),
+    ];
+
     /// The triple `(r, g, b)`.
     #[inline]
     pub const fn new(r: f64, g: f64, b: f64) -> Self {

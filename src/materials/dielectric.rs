@@ -60,14 +60,9 @@ impl Interface {
             tally::count(Event::Dispersions);
             // KHR_materials_dispersion: the indices of red, green and blue.
             let half = (self.ior - 1.0) * 0.025 * self.dispersion;
-            let channels = [
-                Rgb::new(1.0, 0.0, 0.0),
-                Rgb::new(0.0, 1.0, 0.0),
-                Rgb::new(0.0, 0.0, 1.0),
-            ];
             for (ior, channel) in [self.ior - half, self.ior, self.ior + half]
                 .into_iter()
-                .zip(channels)
+                .zip(Rgb::CHANNELS)
             {
                 let lobe = self.lobe(front, ior.max(1.0), channel * self.share);
                 bsdf.push_in(lobe, FrameId::MAIN, events);

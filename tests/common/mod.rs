@@ -8,6 +8,7 @@
 
 pub mod chi2;
 pub mod oracle;
+pub mod photons;
 pub mod points;
 pub mod render;
 pub mod show;

@@ -8,12 +8,6 @@ use crate::color::Rgb;
 /// Samples of the channels, alike ones together.
 pub type ChannelSamples = ArrayVec<BsdfSample, 3>;
 
-const CHANNELS: [Rgb; 3] = [
-    Rgb::new(1.0, 0.0, 0.0),
-    Rgb::new(0.0, 1.0, 0.0),
-    Rgb::new(0.0, 0.0, 1.0),
-];
-
 impl Bsdf {
     /// Whether channels have lobes of their own.
     #[inline]
@@ -35,7 +29,7 @@ impl Bsdf {
     /// are those that [`eval`](Self::eval) weighs by, as if all lobes had been there to pick.
     pub fn sample_channels(&self, carried: Rgb, u_lobe: f64, u: [f64; 2]) -> ChannelSamples {
         let mut out = ChannelSamples::new();
-        for channel in CHANNELS {
+        for channel in Rgb::CHANNELS {
             if (carried * channel).is_black() {
                 continue;
             }

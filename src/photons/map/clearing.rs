@@ -46,7 +46,7 @@ struct Sight {
 }
 
 /// What is around a site within the reach of its kernels.
-pub(super) enum Outlook {
+pub(super) enum Seen {
     /// The surface goes on, and is flat.
     Flat,
     /// The surface goes on, but bends.
@@ -63,7 +63,7 @@ pub(super) struct Clearing {
 }
 
 impl Clearing {
-    fn look(around: Surroundings<'_>, site: &Site, radius: f32) -> Outlook {
+    fn look(around: Surroundings<'_>, site: &Site, radius: f32) -> Seen {
         let view = Look {
             around,
             p: site.p.as_dvec3(),
@@ -79,7 +79,7 @@ impl Clearing {
             sight.distance >= reach
         };
         if (0..DIRECTIONS).step_by(2).all(&mut open) {
-            return if flat { Outlook::Flat } else { Outlook::Bent };
+            return if flat { Seen::Flat } else { Seen::Bent };
         }
         let sights: [Sight; DIRECTIONS] = std::array::from_fn(|k| view.along(COMPASS[k]));
         let sectors = std::array::from_fn(|k| {
@@ -97,7 +97,7 @@ impl Clearing {
                 [a.distance as f32, b.distance as f32]
             }
         });
-        Outlook::Limited(Self { sectors })
+        Seen::Limited(Self { sectors })
     }
 
     fn corners(&self, k: usize) -> [DVec2; 2] {
@@ -217,7 +217,7 @@ pub struct Surroundings<'a> {
 
 impl Surroundings<'_> {
     /// Looks around a site, as far as kernels of this radius reach.
-    pub(super) fn look(self, site: &Site, radius: f32) -> Outlook {
+    pub(super) fn look(self, site: &Site, radius: f32) -> Seen {
         Clearing::look(self, site, radius)
     }
 }

@@ -11,7 +11,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::clearing::{Clearing, Outlook, Plane, Surroundings};
+use super::clearing::{Clearing, Plane, Seen, Surroundings};
 use super::ground::Ground;
 use super::nearest::Closest;
 use super::{KdTree, Limits, Nearest, PackedNormal, PhotonMap, Side, Site};
@@ -47,11 +47,11 @@ impl<'a> Kernel<'a> {
     }
 
     /// A disc near `site`, on the ground that was seen from there.
-    pub(super) fn seen(site: &Site, radius: f32, outlook: &'a Outlook) -> Self {
-        match outlook {
-            Outlook::Flat => Self::disc(radius),
-            Outlook::Bent => Self::on_ground(site, radius, None),
-            Outlook::Limited(clearing) => Self::on_ground(site, radius, Some(clearing)),
+    pub(super) fn seen(site: &Site, radius: f32, seen: &'a Seen) -> Self {
+        match seen {
+            Seen::Flat => Self::disc(radius),
+            Seen::Bent => Self::on_ground(site, radius, None),
+            Seen::Limited(clearing) => Self::on_ground(site, radius, Some(clearing)),
         }
     }
 
@@ -156,12 +156,12 @@ impl Pilot<'_> {
         let map = PhotonMap::build(photons, PILOT_NEAREST, area);
         let scale = (self.nearest as f64 / (PILOT_NEAREST as f64 * self.ratio)).sqrt();
         let widest = (super::REACH * even) as f32;
-        let decided: Vec<(Vec3, Decision, Outlook)> = map
+        let decided: Vec<(Vec3, Decision, Seen)> = map
             .photons()
             .par_chunks(1024)
             .flat_map_iter(|chunk| {
                 let mut found = Nearest::new();
-                let mut part: Vec<(Vec3, Decision, Outlook)> = Vec::new();
+                let mut part: Vec<(Vec3, Decision, Seen)> = Vec::new();
                 for photon in chunk {
                     let site = Site {
                         p: Vec3::from(photon.p),
@@ -177,13 +177,13 @@ impl Pilot<'_> {
                     }) {
                         continue;
                     }
-                    let outlook = self.around.look(&site, radius);
+                    let seen = self.around.look(&site, radius);
                     let decision = Decision {
                         ng: photon.packed_ng(),
                         radius,
                         clearing: OPEN,
                     };
-                    part.push((site.p, decision, outlook));
+                    part.push((site.p, decision, seen));
                 }
                 stage.advance(chunk.len() as u64);
                 part
@@ -192,11 +192,11 @@ impl Pilot<'_> {
         let mut clearings = Vec::new();
         let mut sites: Vec<(Vec3, Decision)> = decided
             .into_iter()
-            .map(|(p, mut decision, outlook)| {
-                match outlook {
-                    Outlook::Flat => {}
-                    Outlook::Bent => decision.clearing = BENT,
-                    Outlook::Limited(c) => {
+            .map(|(p, mut decision, seen)| {
+                match seen {
+                    Seen::Flat => {}
+                    Seen::Bent => decision.clearing = BENT,
+                    Seen::Limited(c) => {
                         decision.clearing = clearings.len() as u32;
                         clearings.push(c);
                     }

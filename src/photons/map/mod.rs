@@ -8,7 +8,7 @@ mod kernels;
 mod nearest;
 mod saved;
 
-use clearing::Outlook;
+use clearing::Seen;
 pub use clearing::Surroundings;
 pub use irradiance::{IrradianceMap, IrradianceSample};
 pub use kdtree::{KdTree, Limits, Search, Within};
@@ -212,9 +212,9 @@ impl PhotonMap {
             return bare;
         }
         match around.look(site, radius) {
-            Outlook::Flat => bare,
-            outlook => {
-                let kernel = Kernel::seen(site, radius, &outlook);
+            Seen::Flat => bare,
+            seen => {
+                let kernel = Kernel::seen(site, radius, &seen);
                 self.estimate_within(site, kernel, keep, f)
             }
         }
