@@ -37,15 +37,18 @@ pub(super) fn choose(
     if let Some(name) = plan.named_integrator() {
         return Ok(settled(table.find(name)?.name, "as was asked for"));
     }
-    if let Some(entry) = with_photons(table).filter(|_| plan.asks_for_photons()) {
+    if plan.asks_for_photons()
+        && let Some(entry) = with_photons(table)
+    {
         return Ok(settled(entry.name, "photons were asked for"));
     }
     let effects = effects::survey(scene, plan.effects(), &registry.effects)?;
     let mut outlook = Outlook::new(scene, effects.set);
     let mut prepared = None;
     if outlook.is_open() && control.stopped().is_none() {
-        let any = table.choose(None)?.name;
-        let settings = plan.settings_for(scene, any, registry)?;
+        // What photons would gain depends on how their pixels would be sampled.
+        let photons = with_photons(table).unwrap_or(table.choose(None)?);
+        let settings = plan.settings_for(scene, photons.name, registry)?;
         let mut built = prepare(scene, &settings, registry, control)?;
         outlook.trial = Some(built.try_out(scene, &settings, registry, control)?);
         prepared = Some(built);
