@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 use crate::film::{Component, Film};
 use crate::integrators::{
     IntegratorSettings, PhotonNeeds, PixelPlan, Region, RenderContext, Spacing, Visibility,
-    camera_pass, enclosed, keeps, planned_camera_pass,
+    camera_pass, enclosed, keeps, none_meets_another, planned_camera_pass,
 };
 use crate::photons::{
     PhotonKey, PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons,
@@ -199,6 +199,21 @@ fn render_in_pool(
         None => prepared::build(scene, settings, registry, control)?,
     };
     clock.take(laps);
+    // What is not known before must not be seen in the filtering of textures.
+    let spacing_spp = match &settings.progressive {
+        Some(_) => SAMPLES_PER_PASS,
+        None => settings.spp,
+    };
+    let spacing = Spacing::new(settings.width, settings.height, spacing_spp);
+    let passed_on = effects.found(EffectSet::CAUSTICS | EffectSet::INDIRECT);
+    // Photons that are kept in a file must not depend on the camera.
+    if !passed_on.is_empty() && session.photons.is_none() {
+        if let Some(n) = none_meets_another(scene, &*accel, &*camera, &spacing, options.seed) {
+            let reason = format!("no surface in sight faces another: of {n} rays none met one");
+            effects.leave_out(&registry.effects, passed_on, &reason);
+        }
+        clock.lap("pilot");
+    }
 
     let first = PhotonSettings {
         seed: options.seed,
@@ -226,12 +241,6 @@ fn render_in_pool(
         None => Film::new(settings.width, settings.height),
     };
     film.keep(&components(effects.set));
-    // What is not known before must not be seen in the filtering of textures.
-    let spacing_spp = match &settings.progressive {
-        Some(_) => SAMPLES_PER_PASS,
-        None => settings.spp,
-    };
-    let spacing = Spacing::new(settings.width, settings.height, spacing_spp);
     let adaptive = settings.pixel_sampling == PixelSampling::Adaptive;
     if adaptive && settings.progressive.is_some() {
         return Err(Error::Usage(

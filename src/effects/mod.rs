@@ -231,9 +231,28 @@ pub struct Effects {
     pub set: EffectSet,
     /// Every effect with its reason.
     pub decisions: Vec<Decision>,
+    /// The effects that the user asked for, whatever the survey finds.
+    forced: EffectSet,
 }
 
 impl Effects {
+    /// The effects of these that are simulated because the survey found them, not because the user
+    /// asked for them.
+    pub fn found(&self, set: EffectSet) -> EffectSet {
+        (self.set & set).difference(self.forced)
+    }
+
+    /// Leaves effects out after all; `table` is the one that they were surveyed by.
+    pub fn leave_out(&mut self, table: &Table<EffectEntry>, set: EffectSet, reason: &str) {
+        self.set.remove(set);
+        for (decision, entry) in self.decisions.iter_mut().zip(table.entries()) {
+            if set.contains(entry.bit) {
+                decision.on = false;
+                reason.clone_into(&mut decision.reason);
+            }
+        }
+    }
+
     /// Tells what each took; `table` is the one that they were surveyed by.
     pub fn account(&mut self, table: &Table<EffectEntry>, tally: &Tally) {
         for (decision, entry) in self.decisions.iter_mut().zip(table.entries()) {
@@ -329,7 +348,11 @@ pub fn survey(scene: &Scene, wish: &str, table: &Table<EffectEntry>) -> Result<E
             cost: None,
         });
     }
-    Ok(Effects { set, decisions })
+    Ok(Effects {
+        set,
+        decisions,
+        forced,
+    })
 }
 
 /// The verdict on a feature of materials: how many have it, and what it `does`, as in "1 material

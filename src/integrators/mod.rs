@@ -25,7 +25,7 @@ pub use noise::noise;
 pub use outlook::{Outlook, Trial};
 pub use pixel_plan::{PixelPlan, planned_camera_pass};
 pub use settings::IntegratorSettings;
-pub use trials::enclosed;
+pub use trials::{enclosed, none_meets_another};
 pub use visibility::Visibility;
 
 use crate::accel::Accelerator;

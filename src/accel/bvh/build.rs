@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::leaf::WIDTH as MAX_LEAF;
 use super::node::{MOST_PRIMS, NOTHING, Node, WIDTH, leaf};
+use super::table::Table;
 
 /// Levels that may follow the heuristic; halving 2²⁷ primitives takes another 26.
 const SAH_LEVELS: usize = 32;
@@ -70,7 +71,7 @@ fn range(first: usize, count: usize) -> u32 {
 /// A tree; leaves hold ranges of the primitives in the order that [`build`] leaves the references in.
 #[derive(Debug)]
 pub(super) struct Tree {
-    pub(super) nodes: Vec<Node>,
+    pub(super) nodes: Table<Node>,
     pub(super) root: u32,
     /// First primitive of each leaf and their number; leaf 0 is the one without any.
     pub(super) leaves: Vec<(u32, u32)>,
@@ -105,7 +106,6 @@ pub(super) fn build(refs: &mut [Ref], parallel: bool) -> Tree {
     } else {
         emit(&mut nodes, refs, 0, 0, parallel)
     };
-    nodes.shrink_to_fit();
     // In the order in which nodes lie, so that leaves lie near what leads to them.
     let mut leaves = Vec::with_capacity(1 + nodes.len() * WIDTH * 3 / 4);
     leaves.push((0, 0));
@@ -118,7 +118,7 @@ pub(super) fn build(refs: &mut [Ref], parallel: bool) -> Tree {
         }
     }
     Tree {
-        nodes,
+        nodes: Table::from_vec(nodes),
         root,
         leaves,
         min: all.min,
@@ -417,7 +417,7 @@ mod tests {
         assert!(
             ta.nodes
                 .iter()
-                .zip(&tb.nodes)
+                .zip(&*tb.nodes)
                 .all(|(x, y)| x.child == y.child && x.planes == y.planes)
         );
     }

@@ -1,22 +1,27 @@
 //! Leaves: up to four primitives with their data side by side, as four are tested at a time.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::{Kind, Prim};
 
 /// Most primitives in a leaf.
 pub(super) const WIDTH: usize = 4;
 
 /// The primitives of a leaf.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
 pub(super) struct Block {
     /// See [`Prim::data`]: corner or row, then coordinate, then primitive.
     pub(super) data: [[[f32; WIDTH]; 3]; 3],
     object: [u32; WIDTH],
     prim: [u32; WIDTH],
-    kind: [Kind; WIDTH],
+    /// Of each, [`Kind`] as a number: a table holds numbers only.
+    kind: [u8; WIDTH],
     count: u8,
-    /// Whether all of them are triangles.
-    pub(super) triangles: bool,
+    /// How many of them are triangles.
+    triangles: u8,
+    /// Up to whole lines of the cache.
+    unused: [u8; 10],
 }
 
 impl Block {
@@ -25,9 +30,10 @@ impl Block {
         data: [[[0.0; WIDTH]; 3]; 3],
         object: [0; WIDTH],
         prim: [0; WIDTH],
-        kind: [Kind::Triangle; WIDTH],
+        kind: [Kind::Triangle as u8; WIDTH],
         count: 0,
-        triangles: true,
+        triangles: 0,
+        unused: [0; 10],
     };
 
     /// A leaf of at most four primitives.
@@ -41,11 +47,17 @@ impl Block {
             }
             block.object[lane] = p.object;
             block.prim[lane] = p.prim;
-            block.kind[lane] = p.kind;
-            block.triangles &= p.kind == Kind::Triangle;
+            block.kind[lane] = p.kind as u8;
+            block.triangles += u8::from(p.kind == Kind::Triangle);
             block.count += 1;
         }
         block
+    }
+
+    /// Whether all of them are triangles.
+    #[inline]
+    pub(super) fn is_of_triangles(&self) -> bool {
+        self.triangles == self.count
     }
 
     #[inline]
@@ -77,7 +89,7 @@ impl Block {
         let (object, prim) = self.name(lane);
         Prim {
             data: self.corners(lane),
-            kind: self.kind[lane & 3],
+            kind: Kind::ALL[usize::from(self.kind[lane & 3]) % Kind::ALL.len()],
             object,
             prim,
         }

@@ -15,6 +15,7 @@ mod lanes;
 mod leaf;
 mod node;
 mod search;
+mod table;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -25,16 +26,23 @@ use rayon::prelude::*;
 use self::build::{Ref, Tree};
 use self::leaf::Block;
 use self::node::MOST_PRIMS;
+use self::table::Table;
 use super::{Accelerator, AcceleratorEntry, BuildStats};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Hit, Object, ObjectId, Placement, Ray, Shape};
 use crate::math::{Aabb, DMat3, DVec3, Vec3, max_abs};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 enum Kind {
     Triangle,
     Sphere,
     Instance,
+}
+
+impl Kind {
+    /// By their numbers.
+    const ALL: [Self; 3] = [Self::Triangle, Self::Sphere, Self::Instance];
 }
 
 /// A primitive as leaves hold it.
@@ -52,7 +60,7 @@ struct Prim {
 #[derive(Debug)]
 struct Level {
     tree: Tree,
-    blocks: Vec<Block>,
+    blocks: Table<Block>,
     /// Primitives in all blocks.
     count: usize,
 }
@@ -80,11 +88,15 @@ impl Level {
             let range = &refs[first as usize..(first + count) as usize];
             Block::new(range.iter().map(|r| entries[r.index as usize].0))
         };
-        let blocks = if parallel {
-            tree.leaves.par_iter().map(block).collect()
-        } else {
-            tree.leaves.iter().map(block).collect()
-        };
+        let leaves = &tree.leaves[..];
+        let blocks = Table::new(leaves.len(), |out: &mut [Block]| {
+            let fill = |(out, leaf): (&mut Block, _)| *out = block(leaf);
+            if parallel {
+                out.par_iter_mut().zip(leaves).for_each(fill);
+            } else {
+                out.iter_mut().zip(leaves).for_each(fill);
+            }
+        });
         tree.leaves = Vec::new();
         let count = refs.len();
         Ok(Self {

@@ -13,6 +13,8 @@
 //! - A direction component below `1e-18` of the length moves the ray by less than the padding: it
 //!   becomes a huge finite reciprocal, so that no product `0·∞` can arise.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::lanes::Lanes;
 use crate::math::{DVec3, max_abs};
 
@@ -33,13 +35,15 @@ pub(super) fn leaf(number: usize) -> u32 {
 }
 
 /// An inner node: the boxes of up to eight children, and their names.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(align(64))]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
 pub(super) struct Node {
     /// Per axis: lower planes, upper planes.
     pub(super) planes: [[[f32; WIDTH]; 2]; 3],
     /// Inner nodes by their index, leaves as [`leaf`] names them.
     pub(super) child: [u32; WIDTH],
+    /// Up to whole lines of the cache.
+    pub(super) unused: [u32; WIDTH],
 }
 
 impl Node {
@@ -47,6 +51,7 @@ impl Node {
     pub(super) const EMPTY: Self = Self {
         planes: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3],
         child: [NOTHING; WIDTH],
+        unused: [0; WIDTH],
     };
 }
 

@@ -248,7 +248,7 @@ impl<L: Lanes, const ANY: bool> Visitor for AtLeaves<'_, L, ANY> {
     #[inline(always)]
     fn visit(&mut self, leaf: usize, bound: &mut f32) -> bool {
         let (block, ray, search) = (&self.level.blocks[leaf], self.ray, &mut *self.search);
-        if block.triangles && search.key.is_none() {
+        if block.is_of_triangles() && search.key.is_none() {
             let triangles = &ray.watertight;
             let found = (self.lanes).triangles(block, triangles, search.tmin, search.tmax);
             let Some((hits, mut mask)) = found else {
