@@ -83,7 +83,11 @@ pub fn enclosed(
 
 /// Paths of a search for light that surfaces pass on. If none of so many finds a way for it, less
 /// than 3 in 131 072 do, by 95 %.
-const PATHS: f64 = (1 << 17) as f64;
+const PATHS: u64 = 1 << 17;
+
+/// The first of them, which find it in nearly every scene. All are followed, so that what they count
+/// does not depend on the threads.
+const FIRST_PATHS: u64 = 64;
 
 /// Surfaces that such a path may be led on by before it counts as found.
 const LED_ON: usize = 16;
@@ -99,20 +103,24 @@ pub fn none_meets_another(
     seed: u64,
 ) -> Option<u64> {
     let [w, h] = spacing.image;
-    let scale = (PATHS / (w * h)).sqrt();
-    let [columns, rows] = [w, h].map(|n| (n * scale).ceil().max(1.0) as u64);
-    let paths = columns * rows;
     let found = |index: u64| {
         let mut sampler = Sampler::new(seed, stream::TRIALS, 1, index);
-        let [jx, jy] = sampler.next_2d();
-        let at = |i: u64, j: f64, n: u64, size: f64| (i as f64 + j) / n as f64 * size;
-        let px = at(index % columns, jx, columns, w);
-        let py = at(index / columns, jy, rows, h);
-        let lens = sampler.next_2d();
-        let ray = spacing.camera_ray(camera, px, py, lens, false).ray;
-        meets_another(scene, accel, ray, &mut sampler)
+        let ([x, y], lens) = (sampler.next_2d(), sampler.next_2d());
+        let camera_ray = spacing.camera_ray(camera, x * w, y * h, lens, false);
+        meets_another(scene, accel, camera_ray.ray, &mut sampler)
     };
-    (!(0..paths).into_par_iter().any(found)).then_some(paths)
+    let (mut from, mut to) = (0, FIRST_PATHS);
+    while from < PATHS {
+        let ways: usize = (from..to)
+            .into_par_iter()
+            .map(|i| usize::from(found(i)))
+            .sum();
+        if ways > 0 {
+            return None;
+        }
+        (from, to) = (to, (4 * to).min(PATHS));
+    }
+    Some(PATHS)
 }
 
 /// Whether a diffuse bounce from what a path sees first, maybe by way of mirrors and glass, meets a
