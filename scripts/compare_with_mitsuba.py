@@ -9,7 +9,7 @@ Needs, beside a release build of Dualight, LLVM for Mitsuba's variant llvm_ad_rg
 DRJIT_LIBLLVM_PATH names it where it is not found), and:
 
     python3 -m venv venv && venv/bin/pip install mitsuba==3.9.1 numpy
-    venv/bin/python scripts/compare_with_mitsuba.py --assets DIRECTORY --budget 90 -o comparison.json
+    venv/bin/python scripts/compare_with_mitsuba.py --assets DIRECTORY --budget 85 -o comparison.json
     venv/bin/python scripts/compare_with_mitsuba.py --table comparison.json
 
 DIRECTORY holds cup.glb, ring.glb, pool.glb, interior.glb and plain.glb.
@@ -251,15 +251,17 @@ def compare(name, args, directory):
             runs["auto"][spp].append(ours.render(spp, seed))
     taken, stages = {spp: ours.taken[spp] for spp in ladder}, ours.stages
     reference_spp = max(round(share["reference"] / photon_rate), 16)
-    halves = [ours.render(reference_spp, 1000 + k, "--integrator", "photon", "--pixel-sampling", "uniform")[0]
-              for k in range(2)]
+    long = [ours.render(reference_spp, 1000 + k, "--integrator", "photon", "--pixel-sampling", "uniform")
+            for k in range(2)]
+    halves = [picture for picture, _ in long]
 
     reference = (halves[0] + halves[1]) / 2
     spread = lambda a, b, truth: float(np.mean((a - b) ** 2 / (truth**2 + 0.01))) / 4
     floor = spread(*halves, reference)
     block_floor = spread(*(blocks(h) for h in halves), blocks(reference))
-    result = {"scene": name, "width": args.size, "height": height, "reference_spp": reference_spp,
-              "reference_relmse": floor, "taken": taken, "profile": stages}
+    result = {"scene": name, "width": args.size, "height": height,
+              "reference_spp": reference_spp, "reference_seconds": sum(t for _, t in long), "reference_relmse": floor,
+              "taken": taken, "profile": stages}
     for key, spp in (("mitsuba", mitsuba_spp), ("path", path_spp)):
         result[key] = {"spp": spp, **steady(runs[key], reference, floor, block_floor)}
     curve = [(float(np.median([t for _, t in r])), float(np.mean([rel_mse(i, reference) for i, _ in r])) - floor)
@@ -278,13 +280,13 @@ def compare(name, args, directory):
 def report(result):
     """Tells a scene's figures as they are measured."""
     print(f"{result['scene']}: {result['elapsed']:.0f} s in all, reference {result['reference_spp']} samples,"
-          f" relMSE {result['reference_relmse']:.2e}")
+          f" {result['reference_seconds']:.1f} s, relMSE {result['reference_relmse']:.2e}")
     for key in ("mitsuba", "path"):
         r = result[key]
         a = r["agreement"]
-        print(f"  {key}: {r['pictures']} pictures of {r['spp']} samples, {r['seconds']:.2f} s, relMSE {r['relmse']:.4g};"
-              f" means {a['ratio_of_means']:.4f}, blocks differ by {a['difference']:.2e} of which noise"
-              f" {a['noise']:.2e}{', light is missing' if r['light_missing'] else ''}")
+        print(f"  {key}: {r['pictures']} pictures of {r['spp']} samples, {r['seconds']:.2f} s,"
+              f" relMSE {r['relmse']:.4g}; means {a['ratio_of_means']:.4f}, blocks differ by {a['difference']:.2e},"
+              f" of which noise {a['noise']:.2e}{', light is missing' if r['light_missing'] else ''}")
     for spp, t, e in result["curve"]:
         print(f"  auto ({result['taken'][spp]}): {spp} samples {t:.2f} s relMSE {e:.3g}")
     total = sum(result["profile"].values())
@@ -298,7 +300,7 @@ def main():
     parser.add_argument("--scenes", nargs="+", choices=SCENES, default=SCENES, metavar="NAME", help=", ".join(SCENES))
     parser.add_argument("--assets", default=".", help="directory of the .glb files from Blender")
     parser.add_argument("--size", type=int, default=96, help="width in pixels; the camera says the height")
-    parser.add_argument("--budget", type=float, default=90, help="seconds for each scene, about")
+    parser.add_argument("--budget", type=float, default=85, help="seconds for each scene, about")
     parser.add_argument("--seeds", type=int, default=3, help="turns, each with seeds of its own")
     parser.add_argument("--enlarge", type=float, nargs=2, default=[1, 1], metavar=("BALLS", "SUNS"),
                         help="factors of the sizes of lamps, to see that the renderers agree")
