@@ -19,7 +19,7 @@ without a reference, and which falls as one over the samples, so that one number
 seconds to every error. Where light is missing from the mean of all their pictures, since not one path
 found it, the variance says too little; then the error of that mean gives a bound from below, "more
 than". Dualight by default may have a bias: its pictures, of more and more samples a
-pixel and no other option, are compared with two long renderings by its `photon` with even samples, less
+pixel and no other option, are compared with two long renderings by its `photon` without interpolation, less
 the error of those, which their difference tells. That reference is compared with the mean of all
 pictures of both path tracers over blocks of pixels, where their noise is small enough to see a bias;
 --enlarge makes the lamps of the scenes from Blender so large that paths find them.
@@ -46,6 +46,8 @@ BOXES = {"box": 0.25, "box-small": 0.05}
 SCENES = [*BOXES, "cup", "ring", "pool", "interior", "plain"]
 # Parts of a scene's time.
 SHARES = {"reference": 0.3, "mitsuba": 0.25, "path": 0.15, "auto": 0.3}
+# Of the reference: nothing interpolated, which would be a bias.
+LONG = ("--integrator", "photon", "--interpolation", "off")
 BLOCK = 8
 
 
@@ -230,7 +232,7 @@ def compare(name, args, directory):
 
     mitsuba(16, 1_000_000)
     per_sample = mitsuba(16, 1_000_001)[1] / 16
-    _, photon_rate = ours.rate("--integrator", "photon", "--pixel-sampling", "uniform")
+    _, photon_rate = ours.rate(*LONG)
     _, path_rate = ours.rate("--integrator", "path")
     first, auto_rate = ours.rate()
     left = max(args.budget - (time.perf_counter() - began), 0.3 * args.budget)
@@ -251,8 +253,7 @@ def compare(name, args, directory):
             runs["auto"][spp].append(ours.render(spp, seed))
     taken, stages = {spp: ours.taken[spp] for spp in ladder}, ours.stages
     reference_spp = max(round(share["reference"] / photon_rate), 16)
-    long = [ours.render(reference_spp, 1000 + k, "--integrator", "photon", "--pixel-sampling", "uniform")
-            for k in range(2)]
+    long = [ours.render(reference_spp, 1000 + k, *LONG) for k in range(2)]
     halves = [picture for picture, _ in long]
 
     reference = (halves[0] + halves[1]) / 2
@@ -299,7 +300,7 @@ def main():
     parser.add_argument("--program", default=str(ROOT / "target" / "release" / "dualight"))
     parser.add_argument("--scenes", nargs="+", choices=SCENES, default=SCENES, metavar="NAME", help=", ".join(SCENES))
     parser.add_argument("--assets", default=".", help="directory of the .glb files from Blender")
-    parser.add_argument("--size", type=int, default=96, help="width in pixels; the camera says the height")
+    parser.add_argument("--size", type=int, default=128, help="width in pixels; the camera says the height")
     parser.add_argument("--budget", type=float, default=85, help="seconds for each scene, about")
     parser.add_argument("--seeds", type=int, default=3, help="turns, each with seeds of its own")
     parser.add_argument("--enlarge", type=float, nargs=2, default=[1, 1], metavar=("BALLS", "SUNS"),
