@@ -1,19 +1,30 @@
 #!/usr/bin/env python3
-"""Seconds to a relative mean squared error: Dualight against Mitsuba 3, on the box, in one run.
+"""Seconds to a relative mean squared error: Dualight against Mitsuba 3 on seven scenes, in one run.
 
-The box of scenes/box.gltf, its lamp with half the width 0.25 and 0.05 and the same flux, is rendered
-by both from the same triangles, spheres and reflectances. The settings of both take turns, several
-seeds each. Needs, beside a release build of Dualight, LLVM for Mitsuba's variant llvm_ad_rgb (Debian:
-libllvm19; DRJIT_LIBLLVM_PATH names it where it is not found), and:
+The box of scenes/box.gltf, its lamp with half the width 0.25 and 0.05 and the same flux, and five scenes
+exported from Blender are rendered by Mitsuba's path tracer, by Dualight's `path` and by Dualight as it
+is by default, from the same triangles, spheres, lamps and reflectances: matched_scenes.py says what is
+changed in the files for that, gltf_to_mitsuba.py reads them. The three take turns, several seeds each.
+Needs, beside a release build of Dualight, LLVM for Mitsuba's variant llvm_ad_rgb (Debian: libllvm19;
+DRJIT_LIBLLVM_PATH names it where it is not found), and:
 
     python3 -m venv venv && venv/bin/pip install mitsuba==3.9.1 numpy
-    venv/bin/python scripts/compare_with_mitsuba.py --size 128 --seeds 3 -o comparison.json
+    venv/bin/python scripts/compare_with_mitsuba.py --assets DIRECTORY --budget 85 -o comparison.json
+    venv/bin/python scripts/compare_with_mitsuba.py --table comparison.json
 
-How errors are found. Mitsuba's path tracer has no bias: its error is its variance, which seeds tell
-without a reference, and which falls as one over the samples. Dualight's photon maps have a bias, so
-their pictures are compared with a long rendering by Dualight, and that with the mean of all pictures
-by Mitsuba, over blocks of pixels, where its noise is small enough to see a bias. Time is that of
-rendering: Mitsuba compiles its kernels in a picture before, Dualight's import is not counted.
+DIRECTORY holds cup.glb, ring.glb, pool.glb, interior.glb and plain.glb.
+
+How errors are found. Path tracers have no bias: their error is their variance, which seeds tell
+without a reference, and which falls as one over the samples, so that one number of samples tells the
+seconds to every error. Where light is missing from the mean of all their pictures, since not one path
+found it, the variance says too little; then the error of that mean gives a bound from below, "more
+than". Dualight by default may have a bias: its pictures, of more and more samples a
+pixel and no other option, are compared with two long renderings by its `photon` without interpolation, less
+the error of those, which their difference tells. That reference is compared with the mean of all
+pictures of both path tracers over blocks of pixels, where their noise is small enough to see a bias;
+--enlarge makes the lamps of the scenes from Blender so large that paths find them.
+Time is that of rendering, on the clock: Mitsuba compiles its kernels in a picture before, Dualight's
+import is not counted.
 """
 
 import argparse
@@ -27,8 +38,17 @@ import tempfile
 import time
 from pathlib import Path
 
+from comparison_table import table
+
 ROOT = Path(__file__).resolve().parent.parent
 TARGETS = [0.01, 0.003, 0.001]
+BOXES = {"box": 0.25, "box-small": 0.05}
+SCENES = [*BOXES, "cup", "ring", "pool", "interior", "plain"]
+# Parts of a scene's time.
+SHARES = {"reference": 0.3, "mitsuba": 0.25, "path": 0.15, "auto": 0.3}
+# Of the reference: nothing interpolated, which would be a bias.
+LONG = ("--integrator", "photon", "--interpolation", "off")
+BLOCK = 8
 
 
 def find_llvm():
@@ -53,7 +73,7 @@ def box(half_width, directory):
     return path, strength["emissiveStrength"]
 
 
-def mitsuba_scene(mi, half_width, radiance, size):
+def mitsuba_box(half_width, radiance, size):
     """The same box for Mitsuba."""
     from mitsuba import ScalarTransform4f as T
 
@@ -65,7 +85,7 @@ def mitsuba_scene(mi, half_width, radiance, size):
     white = grey(0.75, 0.75, 0.75)
     ball = lambda center, bsdf: {"type": "sphere", "center": center, "radius": 0.3, "bsdf": bsdf}
     move, turn = T().translate, T().rotate
-    return mi.load_dict({
+    return {
         "type": "scene",
         "integrator": {"type": "path"},
         "sensor": {
@@ -89,7 +109,22 @@ def mitsuba_scene(mi, half_width, radiance, size):
         "diffuse": ball([-0.6, -0.7, 0.1], white),
         "mirror": ball([0.0, -0.7, -0.4], {"type": "conductor", "material": "none"}),
         "glass": ball([0.6, -0.7, 0.3], {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0}),
-    })
+    }
+
+
+def prepare(name, args, directory):
+    """The scene for both: the file, Mitsuba's dictionary and the height of the picture."""
+    if name in BOXES:
+        path, radiance = box(BOXES[name], directory)
+        return path, mitsuba_box(BOXES[name], radiance, args.size), args.size
+    import gltf_to_mitsuba
+    import matched_scenes
+
+    file = matched_scenes.matched(gltf_to_mitsuba.Gltf.read(Path(args.assets) / f"{name}.glb"), name, *args.enlarge)
+    path = Path(directory) / f"{name}.glb"
+    file.write(path)
+    height = round(args.size / file.doc["cameras"][0]["perspective"]["aspectRatio"])
+    return path, gltf_to_mitsuba.scene_dict(file, args.size, height), height
 
 
 def rel_mse(a, b):
@@ -108,28 +143,65 @@ def read_exr(path):
     return np.stack([data[..., names.index(c)] for c in "RGB"], axis=-1)
 
 
-def blocks(image, n=16):
+def blocks(image, n=BLOCK):
     """Means over blocks of n by n pixels."""
     h, w, c = image.shape
     return image[: h // n * n, : w // n * n].reshape(h // n, n, w // n, n, c).mean(axis=(1, 3))
 
 
-def dualight(program, scene, size, options, directory):
-    """Renders with Dualight; returns the picture, the seconds of rendering and the statistics."""
-    out = Path(directory) / "out.exr"
-    line = [program, "render", scene, "--size", f"{size}x{size}", "-o", out, "--quiet", "--json", *options]
-    done = subprocess.run([str(w) for w in line], check=True, capture_output=True, text=True)
-    stages = {s["stage"]: s["seconds"] for s in json.loads(done.stdout)["statistics"]["stages"]}
-    seconds = sum(t for stage, t in stages.items() if stage not in ("import", "write"))
-    return read_exr(out), seconds, stages
+class Dualight:
+    """Renders one scene with Dualight."""
+
+    def __init__(self, program, scene, size, directory):
+        self.program, self.scene, self.size = program, scene, size
+        self.out = Path(directory) / "out.exr"
+        self.taken, self.stages = {}, {}
+
+    def render(self, spp, seed, *options):
+        """The picture and the seconds of rendering; notes the integrator taken and the stages."""
+        line = [self.program, "render", self.scene, "--size", "{}x{}".format(*self.size), "-o", self.out,
+                "--quiet", "--json", "--spp", spp, "--seed", seed, *options]
+        done = subprocess.run([str(w) for w in line], check=True, capture_output=True, text=True)
+        told = json.loads(done.stdout)
+        self.taken[spp] = told["settings"]["integrator"]
+        self.stages = {s["stage"]: s["seconds"] for s in told["statistics"]["stages"]}
+        return read_exr(self.out), sum(t for s, t in self.stages.items() if s not in ("import", "write"))
+
+    def rate(self, *options):
+        """Seconds of a picture, and of one sample a pixel more."""
+        (_, few), (_, many) = (self.render(spp, 0, *options) for spp in (4, 32))
+        return few, max(many - few, 1e-3 * many) / 28
 
 
-def ladder(size, most=256):
-    """Options of photon mapping, as `dualight accuracy` has them."""
-    for spp in (n for n in (1, 4, 16, 64, 256) if n <= most):
-        photons = max(size * size * min(spp, 16) // 4, 10_000)
-        nearest = max(round(50 * (photons / 1e6) ** (2 / 3)), 8)
-        yield spp, ["--spp", spp, "--photons", photons, "--caustic-photons", photons, "--nearest", nearest]
+def power_of_two(x, least, most):
+    return 2 ** round(math.log2(min(max(x, least), most)))
+
+
+def steady(runs, reference, floor, block_floor):
+    """What pictures without bias tell: their relMSE, the seconds of one, and what an error costs."""
+    import numpy as np
+
+    pictures = np.array([p for p, _ in runs])
+    variance = float(np.mean(np.var(pictures, axis=0, ddof=1) / (reference**2 + 0.01)))
+    seconds = float(np.median([t for _, t in runs]))
+    agrees = agreement(pictures, reference, block_floor)
+    # Error times seconds is constant for it.
+    cost, missing = variance * seconds, agrees["difference"] > 3 * agrees["noise"]
+    if missing:
+        cost = max(cost, (rel_mse(pictures.mean(axis=0), reference) - floor) * seconds * len(pictures))
+    return {"pictures": len(pictures), "seconds": seconds, "relmse": variance, "cost": cost,
+            "light_missing": missing, "agreement": agrees}
+
+
+def agreement(pictures, reference, reference_noise):
+    """How the mean of pictures differs from the reference over blocks, and how much of it is noise."""
+    import numpy as np
+
+    mean, truth = blocks(pictures.mean(axis=0)), blocks(reference)
+    stack = np.array([blocks(p) for p in pictures])
+    noise = np.mean(np.var(stack, axis=0, ddof=1) / len(stack) / (truth**2 + 0.01))
+    return {"ratio_of_means": float(mean.mean() / truth.mean()), "difference": rel_mse(mean, truth),
+            "noise": float(noise) + reference_noise}
 
 
 def reach(points, level):
@@ -138,91 +210,120 @@ def reach(points, level):
         return points[0][0], "at most"
     for (t0, e0), (t1, e1) in zip(points, points[1:]):
         if e1 <= level:
-            f = math.log(level / e0) / math.log(e1 / e0)
+            f = math.log(level / e0) / math.log(max(e1, 1e-12) / e0)
             return t0 * (t1 / t0) ** f, ""
     return None, "not reached"
 
 
-def compare(half_width, args, directory):
-    """Measures one lamp."""
+def compare(name, args, directory):
+    """Measures one scene."""
     import mitsuba as mi
     import numpy as np
 
-    scene, radiance = box(half_width, directory)
-    theirs = mitsuba_scene(mi, half_width, radiance, args.size)
-    render = lambda seed: np.array(mi.render(theirs, spp=args.spp, seed=seed), dtype=np.float64)
-    render(1_000_000)
-    pictures, seconds, ours = [], [], {spp: [] for spp, _ in ladder(args.size, args.most_spp)}
-    profile = {}
-    for seed in range(args.seeds):
-        for _ in range(args.mitsuba_pictures):
-            start = time.perf_counter()
-            pictures.append(render(len(pictures)))
-            seconds.append(time.perf_counter() - start)
-        for spp, options in ladder(args.size, args.most_spp):
-            image, t, stages = dualight(args.program, scene, args.size, [*options, "--seed", seed], directory)
-            ours[spp].append((image, t))
-            profile[spp] = stages
-    reference, _, _ = dualight(
-        args.program, scene, args.size,
-        ["--spp", args.reference_spp, "--photons", "1M", "--caustic-photons", "1M", "--seed", 999], directory)
+    began = time.perf_counter()
+    path, described, height = prepare(name, args, directory)
+    theirs = mi.load_dict(described)
+    ours = Dualight(args.program, path, (args.size, height), directory)
 
-    weight = 1 / (reference**2 + 0.01)
-    mean = np.mean(pictures, axis=0)
-    variance = float(np.mean(np.var(pictures, axis=0, ddof=1) * weight))
-    per_picture = float(np.median(seconds))
-    # Error times seconds is constant for it.
-    cost = variance * per_picture
-    difference = rel_mse(blocks(mean), blocks(reference))
-    n = len(pictures)
-    stack = np.array([blocks(p) for p in pictures])
-    noise = float(np.mean(np.var(stack, axis=0, ddof=1) / n / (blocks(reference) ** 2 + 0.01)))
-    curve = [(float(np.median([t for _, t in runs])), float(np.mean([rel_mse(i, reference) for i, _ in runs])))
-             for runs in ours.values()]
-    rows = []
+    def mitsuba(spp, seed):
+        start = time.perf_counter()
+        picture = np.array(mi.render(theirs, spp=spp, seed=seed), dtype=np.float64)
+        return picture, time.perf_counter() - start
+
+    mitsuba(16, 1_000_000)
+    per_sample = mitsuba(16, 1_000_001)[1] / 16
+    _, photon_rate = ours.rate(*LONG)
+    _, path_rate = ours.rate("--integrator", "path")
+    first, auto_rate = ours.rate()
+    left = max(args.budget - (time.perf_counter() - began), 0.3 * args.budget)
+    share = {k: v * left / (2 if k == "reference" else args.seeds) for k, v in SHARES.items()}
+    mitsuba_spp = power_of_two(share["mitsuba"] / 2 / per_sample, 16, 256)
+    mitsuba_pictures = max(round(share["mitsuba"] / (mitsuba_spp * per_sample)), 2)
+    path_spp = power_of_two(share["path"] / 2 / path_rate, 16, 4096)
+    # A ladder of factors of four takes 4/3 of the time of its last rung.
+    longest = max((share["auto"] / 4 * 3 - first) / auto_rate, 16)
+    ladder = [4**k for k in range(1 + int(math.log(longest, 4)))]
+
+    mitsuba(mitsuba_spp, 1_000_002)
+    runs = {"mitsuba": [], "path": [], "auto": {spp: [] for spp in ladder}}
+    for seed in range(args.seeds):
+        runs["mitsuba"] += [mitsuba(mitsuba_spp, len(runs["mitsuba"]) + k) for k in range(mitsuba_pictures)]
+        runs["path"] += [ours.render(path_spp, 2 * seed + k, "--integrator", "path") for k in range(2)]
+        for spp in ladder:
+            runs["auto"][spp].append(ours.render(spp, seed))
+    taken, stages = {spp: ours.taken[spp] for spp in ladder}, ours.stages
+    reference_spp = max(round(share["reference"] / photon_rate), 16)
+    long = [ours.render(reference_spp, 1000 + k, *LONG) for k in range(2)]
+    halves = [picture for picture, _ in long]
+
+    reference = (halves[0] + halves[1]) / 2
+    spread = lambda a, b, truth: float(np.mean((a - b) ** 2 / (truth**2 + 0.01))) / 4
+    floor = spread(*halves, reference)
+    block_floor = spread(*(blocks(h) for h in halves), blocks(reference))
+    result = {"scene": name, "width": args.size, "height": height,
+              "reference_spp": reference_spp, "reference_seconds": sum(t for _, t in long), "reference_relmse": floor,
+              "taken": taken, "profile": stages}
+    for key, spp in (("mitsuba", mitsuba_spp), ("path", path_spp)):
+        result[key] = {"spp": spp, **steady(runs[key], reference, floor, block_floor)}
+    curve = [(float(np.median([t for _, t in r])), float(np.mean([rel_mse(i, reference) for i, _ in r])) - floor)
+             for r in runs["auto"].values()]
+    result["curve"] = [[spp, t, e] for spp, (t, e) in zip(ladder, curve)]
+    result["times"] = []
     for level in TARGETS:
-        t, note = reach(curve, level)
-        rows.append({"relmse": level, "mitsuba": cost / level, "dualight": t, "note": note,
-                     "ratio": cost / level / t if t else None})
-    result = {"half_width": half_width, "mitsuba_spp": args.spp, "mitsuba_relmse": variance,
-              "mitsuba_seconds": per_picture, "dualight_curve": curve, "times": rows,
-              "block_difference": difference, "block_noise": noise, "profile": profile}
-    print(f"lamp half-width {half_width}: Mitsuba {args.spp} samples {per_picture:.2f} s relMSE {variance:.4f}")
-    for t, e in curve:
-        print(f"  Dualight {t:8.2f} s  relMSE {e:.5f}")
-    for r in rows:
-        t = f"{r['note']} {r['dualight']:.2f} s" if r["dualight"] else r["note"]
-        ratio = f"{r['ratio']:.1f} times" if r["ratio"] else ""
-        print(f"  relMSE {r['relmse']}: Mitsuba {r['mitsuba']:.1f} s, Dualight {t}  {ratio}")
-    print(f"  over blocks the means differ by relMSE {difference:.2e}, of which noise {noise:.2e}")
-    last = profile[max(profile)]
-    total = sum(last.values())
-    print("  time of Dualight's longest: " + ", ".join(f"{k} {100 * v / total:.0f} %" for k, v in last.items()))
+        t, note = reach(curve, level) if level > floor else (None, "below the error of the reference")
+        result["times"].append({"relmse": level, "mitsuba": result["mitsuba"]["cost"] / level,
+                                "path": result["path"]["cost"] / level, "auto": t, "note": note})
+    result["elapsed"] = time.perf_counter() - began
+    report(result)
     return result
+
+
+def report(result):
+    """Tells a scene's figures as they are measured."""
+    print(f"{result['scene']}: {result['elapsed']:.0f} s in all, reference {result['reference_spp']} samples,"
+          f" {result['reference_seconds']:.1f} s, relMSE {result['reference_relmse']:.2e}")
+    for key in ("mitsuba", "path"):
+        r = result[key]
+        a = r["agreement"]
+        print(f"  {key}: {r['pictures']} pictures of {r['spp']} samples, {r['seconds']:.2f} s,"
+              f" relMSE {r['relmse']:.4g}; means {a['ratio_of_means']:.4f}, blocks differ by {a['difference']:.2e},"
+              f" of which noise {a['noise']:.2e}{', light is missing' if r['light_missing'] else ''}")
+    for spp, t, e in result["curve"]:
+        print(f"  auto ({result['taken'][spp]}): {spp} samples {t:.2f} s relMSE {e:.3g}")
+    total = sum(result["profile"].values())
+    parts = ", ".join(f"{k} {100 * v / total:.0f} %" for k, v in result["profile"].items())
+    print("  time of the longest: " + parts, flush=True)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--program", default=str(ROOT / "target" / "release" / "dualight"))
-    parser.add_argument("--size", type=int, default=128, help="width and height in pixels")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--spp", type=int, default=256, help="samples of Mitsuba's pictures")
-    parser.add_argument("--mitsuba-pictures", type=int, default=4, help="pictures by Mitsuba per seed")
-    parser.add_argument("--most-spp", type=int, default=256, help="samples of Dualight's longest pictures")
-    parser.add_argument("--reference-spp", type=int, default=1024)
-    parser.add_argument("--half-widths", type=float, nargs="+", default=[0.25, 0.05])
+    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=SCENES, metavar="NAME", help=", ".join(SCENES))
+    parser.add_argument("--assets", default=".", help="directory of the .glb files from Blender")
+    parser.add_argument("--size", type=int, default=128, help="width in pixels; the camera says the height")
+    parser.add_argument("--budget", type=float, default=85, help="seconds for each scene, about")
+    parser.add_argument("--seeds", type=int, default=3, help="turns, each with seeds of its own")
+    parser.add_argument("--enlarge", type=float, nargs=2, default=[1, 1], metavar=("BALLS", "SUNS"),
+                        help="factors of the sizes of lamps, to see that the renderers agree")
     parser.add_argument("-o", "--output", help="JSON file to write")
+    parser.add_argument("--table", metavar="FILE", help="only print the tables of a JSON file written before")
     args = parser.parse_args()
+    if args.table:
+        print(table(json.loads(Path(args.table).read_text())))
+        return
     find_llvm()
     try:
         import mitsuba as mi
     except ImportError:
         sys.exit("compare_with_mitsuba.py: Mitsuba is not installed; see the head of this file")
     mi.set_variant("llvm_ad_rgb")
+    results = []
     with tempfile.TemporaryDirectory() as directory:
-        results = [compare(h, args, directory) for h in args.half_widths]
-    if args.output:
-        Path(args.output).write_text(json.dumps({"mitsuba": mi.__version__, "results": results}, indent=1) + "\n")
+        for name in args.scenes:
+            results.append(compare(name, args, directory))
+            if args.output:
+                done = {"mitsuba": mi.__version__, "results": results}
+                Path(args.output).write_text(json.dumps(done, indent=1) + "\n")
 
 
 if __name__ == "__main__":
