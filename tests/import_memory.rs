@@ -119,7 +119,8 @@ fn packed_by_draco() -> Asset {
         json!({"primitives": [p]})
     };
     let meshes = (0..MESHES).map(mesh).collect();
-    a.json["accessors"] = Value::Array(accessors.repeat(MESHES));
+    let all = std::iter::repeat_n(&accessors, MESHES).flatten();
+    a.json["accessors"] = all.cloned().collect();
     show(&mut a, meshes);
     a
 }
@@ -233,6 +234,6 @@ fn reading_takes_little_more_than_what_is_read() {
     {
         let ratio = measure("Draco", &packed_by_draco().glb()).unwrap();
         // The decoder needs five times what it makes, but of one or two of forty meshes.
-        assert!(ratio < 2.0, "{ratio}");
+        assert!(ratio < 1.5, "{ratio}");
     }
 }

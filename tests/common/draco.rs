@@ -1,4 +1,5 @@
 //! Meshes packed by Draco's encoder, for files that are made in a test.
+#![allow(dead_code, reason = "each test uses a part of it")]
 
 use draco_core::{
     DataType, EncoderBuffer, EncoderOptions, FaceIndex, GeometryAttributeType, Mesh, MeshEncoder,
