@@ -46,6 +46,10 @@ def cycles(blend, args, directory):
     if args.sharp_edges:
         for mesh in bpy.data.meshes:
             mark_sharp(mesh)
+    if args.lamp_radius is not None:
+        for lamp in bpy.data.lights:
+            if lamp.type in {"POINT", "SPOT"}:
+                lamp.shadow_soft_size, lamp.use_soft_falloff = args.lamp_radius, False
     r, c = scene.render, scene.cycles
     r.engine, c.device = "CYCLES", "CPU"
     r.resolution_x, r.resolution_y, r.resolution_percentage = *size, 100
@@ -189,6 +193,8 @@ def main():
     parser.add_argument("--point-lamps", action="store_true",
                         help="leave out of Cycles what mirrors show of light sources: the exporter makes points "
                              "of lamps, and no mirror shows a point")
+    parser.add_argument("--lamp-radius", type=float, metavar="METRES",
+                        help="radius of points and spots in Cycles, which hardly finds the caustics of small ones")
     parser.add_argument("--png", help="folder for pictures: Cycles, then each integrator")
     args = parser.parse_args()
     print(f"{'scene':10} {'by':7} {'part':12} {'Cycles':>9} {'Dualight':>9} {'ratio':>7}")

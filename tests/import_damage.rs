@@ -2,6 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod asset;
+#[cfg(feature = "draco")]
+#[path = "common/draco.rs"]
+mod draco;
 
 use std::fs;
 use std::path::Path;
@@ -213,6 +216,31 @@ fn a_damaged_meshopt_file_never_panics() {
     assert_eq!((m.positions.len(), m.indices.len()), (200, 198));
     assert_eq!(m.positions[7], [7., 15., 2.]);
     shake(&a, 2, 1000);
+}
+
+#[cfg(feature = "draco")]
+#[test]
+fn a_damaged_draco_file_never_panics() {
+    let side = 9_u32;
+    let vertex = |i: u32| [(i % side) as f32, (i / side) as f32, (i * i % 7) as f32];
+    let positions: Vec<f32> = (0..side * side).flat_map(vertex).collect();
+    let cells = (0..side * side).filter(|i| i % side + 1 < side && i / side + 1 < side);
+    let triangles: Vec<_> = cells
+        .flat_map(|i| [[i, i + 1, i + side], [i + side, i + 1, i + side + 1]])
+        .collect();
+    for (seed, speed) in [(3, 0), (4, 5), (5, 10)] {
+        let mut a = Asset::new();
+        let columns = [draco::Column {
+            name: "POSITION",
+            width: 3,
+            numbers: draco::Numbers::Floats(&positions),
+        }];
+        let vertices = (side * side) as usize;
+        let p = draco::primitive(&mut a, &columns, &triangles, vertices, speed);
+        a.json["meshes"][0]["primitives"] = json!([p]);
+        assert_eq!(a.mesh().indices.len(), 128);
+        shake(&a, seed, 400);
+    }
 }
 
 /// Real files, Draco among them, where they are at hand.

@@ -169,6 +169,11 @@ fn what_surfaces_emit_is_in_the_units_of_the_lamps() {
             .any(|n| n.contains("no lamp is in the file"));
         assert_eq!(told, light_units == LightUnits::Auto, "{:?}", scene.notes);
     }
+    // There is nothing to tell of Blender's files: it writes no other units of emission.
+    let mut blenders = glowing();
+    blenders.json["asset"]["generator"] = json!("Khronos glTF Blender I/O v5.0.21");
+    let scene = blenders.read().unwrap();
+    assert!(scene.notes.is_empty() && close(flux(&scene), 2.0 * watts));
     // What is unlit shines for nobody, whatever else the material says.
     let mut unlit = glowing();
     unlit.json["materials"][0]["extensions"]["KHR_materials_unlit"] = json!({});

@@ -3,6 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod asset;
+#[cfg(feature = "draco")]
+#[path = "common/draco.rs"]
+mod draco;
 #[path = "common/memory.rs"]
 mod memory;
 
@@ -28,17 +31,30 @@ fn vertices<const N: usize>(mesh: usize, at: impl Fn(f32, f32) -> [f32; N]) -> V
     (0..n * n).map(one).collect()
 }
 
-/// Wavy grids with normals and texture coordinates, all of one kind in one buffer view that `pack`
-/// makes, as gltfpack writes them.
-fn grids(mut pack: impl FnMut(&mut Asset, &[u8], usize, bool) -> usize) -> Asset {
-    let mut a = Asset::new();
-    let (n, quads) = ((SIDE + 1) * (SIDE + 1), SIDE * SIDE);
+/// Corners of the triangles of one mesh.
+fn corners() -> Vec<u32> {
     let mut order: Vec<u32> = Vec::new();
-    for quad in 0..quads {
+    for quad in 0..SIDE * SIDE {
         let first = (quad / SIDE * (SIDE + 1) + quad % SIDE) as u32;
         let below = first + SIDE as u32 + 1;
         order.extend([first, below, first + 1, first + 1, below, below + 1]);
     }
+    order
+}
+
+/// Shows every mesh of a file once.
+fn show(a: &mut Asset, meshes: Vec<Value>) {
+    let node = |m| json!({"mesh": m, "translation": [0, 0, m]});
+    a.json["nodes"] = (0..meshes.len()).map(node).collect();
+    a.json["scenes"] = json!([{"nodes": (0..meshes.len()).collect::<Vec<_>>()}]);
+    a.json["meshes"] = Value::Array(meshes);
+}
+
+/// Wavy grids with normals and texture coordinates, all of one kind in one buffer view that `pack`
+/// makes, as gltfpack writes them.
+fn grids(mut pack: impl FnMut(&mut Asset, &[u8], usize, bool) -> usize) -> Asset {
+    let mut a = Asset::new();
+    let (n, quads, order) = ((SIDE + 1) * (SIDE + 1), SIDE * SIDE, corners());
     let mut view = |a: &mut Asset, numbers: Vec<f32>, width: usize| {
         pack(a, bytemuck::cast_slice(&numbers), 4 * width, false)
     };
@@ -52,8 +68,7 @@ fn grids(mut pack: impl FnMut(&mut Asset, &[u8], usize, bool) -> usize) -> Asset
     let uv = view(&mut a, uv, 2);
     let order: Vec<u32> = (0..MESHES).flat_map(|_| order.clone()).collect();
     let order = pack(&mut a, bytemuck::cast_slice(&order), 4, true);
-    a.json["meshes"] = json!([]);
-    a.json["nodes"] = json!([]);
+    let mut meshes = Vec::new();
     for m in 0..MESHES {
         let mut accessor = |view: usize, component: u32, kind: &str, count: usize, size: usize| {
             a.accessor(json!({
@@ -69,14 +84,44 @@ fn grids(mut pack: impl FnMut(&mut Asset, &[u8], usize, bool) -> usize) -> Asset
             },
             "indices": accessor(order, 5125, "SCALAR", 6 * quads, 4),
         });
-        let push = |list: &mut Value, v: Value| list.as_array_mut().unwrap().push(v);
-        push(&mut a.json["meshes"], json!({"primitives": [primitive]}));
-        push(
-            &mut a.json["nodes"],
-            json!({"mesh": m, "translation": [0, 0, m]}),
-        );
+        meshes.push(json!({"primitives": [primitive]}));
     }
-    a.json["scenes"] = json!([{"nodes": (0..MESHES).collect::<Vec<_>>()}]);
+    show(&mut a, meshes);
+    a
+}
+
+/// Such grids, each packed by Draco.
+#[cfg(feature = "draco")]
+fn packed_by_draco() -> Asset {
+    let mut a = Asset::new();
+    let (n, order) = ((SIDE + 1) * (SIDE + 1), corners());
+    let p = vertices(0, |u, v| [u, (9.0 * u * v).sin(), v]).into_flattened();
+    let normals = vertices(0, |u, v| [(u * v).sin(), (u * v).cos(), 0.0]).into_flattened();
+    let uv = vertices(0, |u, v| [u, v]).into_flattened();
+    let column = |name, width, numbers| draco::Column {
+        name,
+        width,
+        numbers: draco::Numbers::Floats(numbers),
+    };
+    let columns = [
+        column("POSITION", 3, &p),
+        column("NORMAL", 3, &normals),
+        column("TEXCOORD_0", 2, &uv),
+    ];
+    let primitive = draco::primitive(&mut a, &columns, order.as_chunks().0, n, 5);
+    // The same stream for all, by accessors of their own: equal primitives would be one shape.
+    let accessors = a.json["accessors"].as_array().unwrap().clone();
+    let mesh = |m: usize| {
+        let mut p = primitive.clone();
+        for index in p["attributes"].as_object_mut().unwrap().values_mut() {
+            *index = json!(index.as_u64().unwrap() as usize + m * accessors.len());
+        }
+        json!({"primitives": [p]})
+    };
+    let meshes = (0..MESHES).map(mesh).collect();
+    let all = std::iter::repeat_n(&accessors, MESHES).flatten();
+    a.json["accessors"] = all.cloned().collect();
+    show(&mut a, meshes);
     a
 }
 
@@ -85,10 +130,10 @@ const FILE: &str = "DUALIGHT_TEST_FILE";
 
 /// Peak of memory while a file is read, over the size of what it holds; `None` where the system does
 /// not tell. In a process of its own, since freed memory stays with those that had it.
-fn measure(what: &str, a: &Asset) -> Option<f64> {
+fn measure(what: &str, file: &[u8]) -> Option<f64> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("scene.glb");
-    fs::write(&path, a.glb()).unwrap();
+    fs::write(&path, file).unwrap();
     let out = Command::new(std::env::current_exe().unwrap())
         .args(["a_process_of_its_own", "--exact", "--nocapture"])
         .env(FILE, &path)
@@ -140,12 +185,16 @@ fn a_process_of_its_own() {
 #[test]
 fn reading_takes_little_more_than_what_is_read() {
     let plain = grids(|a, bytes, _, _| a.view(bytes));
-    let Some(ratio) = measure("plain", &plain) else {
+    let Some(ratio) = measure("plain", &plain.glb()) else {
         eprintln!("skipped: this system does not tell the peak of memory");
         return;
     };
     // On top come blocks that are being converted, and the JSON.
     assert!(ratio < 1.15, "{ratio}");
+
+    // Text with all data in it: 4/3 of the data as it is parsed, and the same again that is parsed.
+    let ratio = measure("data URIs", plain.text().as_bytes()).unwrap();
+    assert!(ratio < 2.8, "{ratio}");
 
     #[cfg(feature = "meshopt")]
     {
@@ -176,9 +225,15 @@ fn reading_takes_little_more_than_what_is_read() {
             });
             view
         });
-        let ratio = measure("packed", &packed).unwrap();
+        let ratio = measure("packed", &packed.glb()).unwrap();
         // What is unpacked goes as what is made of it comes; a view that was just unpacked is in
         // memory twice while it is divided, with its packed bytes.
         assert!(ratio < 1.6, "{ratio}");
+    }
+    #[cfg(feature = "draco")]
+    {
+        let ratio = measure("Draco", &packed_by_draco().glb()).unwrap();
+        // The decoder needs five times what it makes, but of one or two of forty meshes.
+        assert!(ratio < 1.5, "{ratio}");
     }
 }

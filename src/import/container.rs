@@ -25,7 +25,7 @@ pub(super) fn open(
     path: &Path,
     check: impl FnOnce(&Cursor<'_>) -> Result<(), Problem>,
 ) -> Result<Document, Problem> {
-    let (file, parts, json) = open_json(path)?;
+    let (file, parts, mut json) = open_json(path)?;
     let mut size = file.len();
     let root = Cursor::root(&json);
     check_version(&root)?;
@@ -40,11 +40,26 @@ pub(super) fn open(
         }
         buffers.push(data);
     }
+    forget_data(&mut json);
     Ok(Document {
         json,
         buffers,
         size,
     })
+}
+
+/// Drops the text of buffers that stand in the JSON themselves: it is in memory as bytes now.
+fn forget_data(json: &mut Value) {
+    let buffers = json.get_mut("buffers").and_then(Value::as_array_mut);
+    for uri in buffers
+        .into_iter()
+        .flatten()
+        .filter_map(|b| b.get_mut("uri"))
+    {
+        if uri.as_str().is_some_and(|u| u.starts_with("data:")) {
+            *uri = Value::Null;
+        }
+    }
 }
 
 /// The JSON of the file at `path`, as it stands.
@@ -208,7 +223,10 @@ fn open_uri(uri: &Cursor<'_>, index: usize, file: &Path) -> Result<Buffer, Probl
 }
 
 fn unreadable(uri: &Cursor<'_>, path: &Path, e: &io::Error) -> Problem {
-    uri.problem(format!("the file {} cannot be read ({e})", path.display()))
+    Problem {
+        remedy: "put it there, or export all as one .glb".into(),
+        ..uri.problem(format!("the file {} cannot be read ({e})", path.display()))
+    }
 }
 
 /// The bytes that a URI holds or names, in a file beside `file`.
@@ -235,9 +253,12 @@ pub(super) fn read_uri(uri: &Cursor<'_>, file: &Path) -> Result<Vec<u8>, Problem
 fn beside(uri: &Cursor<'_>, file: &Path) -> Result<PathBuf, Problem> {
     let text = uri.str()?;
     if text.contains("://") {
-        return Err(uri.problem(format!(
-            "'{text}' is not beside the file; remote files are not read"
-        )));
+        return Err(Problem {
+            remedy: "fetch it, and name it by its path".into(),
+            ..uri.problem(format!(
+                "'{text}' is not beside the file; remote files are not read"
+            ))
+        });
     }
     let name = percent_decode(text)
         .and_then(|bytes| String::from_utf8(bytes).ok())

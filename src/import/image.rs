@@ -40,6 +40,13 @@ enum State {
     Foreign,
 }
 
+/// Where the bytes of an image are.
+#[derive(PartialEq, Eq, Hash)]
+enum Bytes<'a> {
+    Uri(&'a str),
+    View(usize),
+}
+
 /// The images of a file.
 pub(super) struct Images<'a> {
     root: Cursor<'a>,
@@ -98,14 +105,14 @@ impl<'a> Images<'a> {
         let mut indices: Vec<usize> = self.wanted.keys().copied().collect();
         indices.sort_unstable();
         // Entries that name the same bytes are one image.
-        let mut first: HashMap<String, usize> = HashMap::new();
+        let mut first: HashMap<Bytes<'_>, usize> = HashMap::new();
         let mut same = Vec::new();
         let mut tasks = Vec::new();
         for index in indices {
             let image = self.root.element("images", index, &self.root)?;
             let key = match (image.get("uri"), image.get("bufferView")) {
-                (Some(uri), _) => uri.str()?.to_owned(),
-                (None, Some(view)) => format!("\0{}", view.index()?),
+                (Some(uri), _) => Bytes::Uri(uri.str()?),
+                (None, Some(view)) => Bytes::View(view.index()?),
                 _ => return Err(image.problem("has neither a URI nor a buffer view")),
             };
             match first.get(&key) {

@@ -48,17 +48,17 @@ pub(super) fn resolve(
         );
         return Ok(LightUnits::Photometric);
     }
+    // Blender's emission is in watts in any case.
+    if dialect.is_blender() {
+        return Ok(LightUnits::Blender);
+    }
     if dialect::emits(root) {
         builder.inform(
             "no lamp is in the file: what surfaces emit is taken as W/(m²·sr), for which \
              --light-units photometric would read cd/m²",
         );
     }
-    Ok(if dialect.is_blender() {
-        LightUnits::Blender
-    } else {
-        LightUnits::Radiometric
-    })
+    Ok(LightUnits::Radiometric)
 }
 
 /// Reads the light that `at` refers to, for a node that stands at `world`.

@@ -1,6 +1,8 @@
 //! Nodes: lights, cameras and meshes where they stand. Meshes are read in parallel, each once.
 
+use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 #[cfg(feature = "meshopt")]
@@ -8,6 +10,8 @@ use serde_json::Value;
 
 use super::accessor::Source;
 use super::dialect::Dialect;
+#[cfg(feature = "draco")]
+use super::draco;
 use super::hierarchy::Hierarchy;
 use super::json::Cursor;
 use super::mesh::{Part, Shaping};
@@ -218,11 +222,10 @@ impl<'a> Walker<'a, '_> {
         let skin = node.get("skin");
         let skinned = skin.as_ref().map(Cursor::index).transpose()?;
         let bits = weights.iter().map(|w| w.to_bits()).collect();
-        if let Some(&known) = met.known.get(&(which, skinned, bits)) {
-            return Ok(known);
-        }
-        let bits = weights.iter().map(|w| w.to_bits()).collect();
-        met.known.insert((which, skinned, bits), met.posed.len());
+        match met.known.entry((which, skinned, bits)) {
+            Entry::Occupied(known) => return Ok(*known.get()),
+            Entry::Vacant(free) => free.insert(met.posed.len()),
+        };
         let hierarchy = &mut self.hierarchy;
         met.posed.push(Posed {
             mesh,
@@ -288,18 +291,21 @@ impl<'a> Walker<'a, '_> {
             let accessors = jobs.iter().flat_map(Job::accessors);
             Users::new(&source.root, &source.views.unpacked, accessors)
         };
-        let done: Vec<_> = jobs
-            .par_iter()
-            .map(|job| {
-                let mut notes = Notes::default();
+        let (order, next) = (in_order(jobs, source), AtomicUsize::new(0));
+        let mut done: Vec<_> = (0..jobs.len())
+            .into_par_iter()
+            .map(|_| {
+                let at = order[next.fetch_add(1, Ordering::Relaxed)];
+                let (job, mut notes) = (&jobs[at], Notes::default());
                 let part = job.read(source, &posed[job.posed], &mut notes);
                 #[cfg(feature = "meshopt")]
                 job.accessors().into_iter().for_each(|a| users.done(a));
-                (part, notes)
+                (at, part, notes)
             })
             .collect();
+        done.sort_unstable_by_key(|(at, ..)| *at);
         let mut parts = Vec::new();
-        for (part, notes) in done {
+        for (_, part, notes) in done {
             self.notes.join(notes);
             parts.push(part?);
         }
@@ -424,6 +430,21 @@ impl<'a> Job<'a> {
         }
         Ok(part)
     }
+}
+
+/// In which order the jobs are begun: first what takes the most memory while it is decoded, since the
+/// least is there beside it then. Others stay as they come.
+#[cfg(feature = "draco")]
+fn in_order(jobs: &[Job<'_>], source: &Source<'_>) -> Vec<usize> {
+    let sizes = draco::sizes(&source.root, jobs.iter().map(|j| &j.primitive));
+    let mut order: Vec<usize> = (0..jobs.len()).collect();
+    order.sort_by_key(|&i| std::cmp::Reverse(sizes[i]));
+    order
+}
+
+#[cfg(not(feature = "draco"))]
+fn in_order(jobs: &[Job<'_>], _: &Source<'_>) -> Vec<usize> {
+    (0..jobs.len()).collect()
 }
 
 /// All of a primitive that says something about its shape, as text.
