@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::integrators::{PhotonNeeds, RenderContext, Spacing, Trial, Visibility, noise};
 
 use crate::photons::map::PhotonMap;
-use crate::photons::{Photon, PhotonMaps, PhotonSettings, trace_photons};
+use crate::photons::{Guidance, Photon, PhotonMaps, PhotonSettings, trace_photons};
 use crate::plugins::Registry;
 use crate::scene::Scene;
 use crate::stats::StageTime;
@@ -116,6 +116,7 @@ fn try_out(
         nearest: options.nearest,
         max_depth: options.max_depth,
         roulette: options.roulette,
+        guidance: Guidance::Off,
     };
     let emission = registry.emissions.choose(settings.emission.as_deref())?;
     let silent = control.silent();
