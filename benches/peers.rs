@@ -76,6 +76,7 @@ fn photons(count: u64) -> Vec<[f32; 3]> {
         seed: 1,
         purpose: Purpose::Global,
         count,
+        guide: None,
     });
     let settings = PhotonSettings {
         seed: 1,
@@ -84,6 +85,7 @@ fn photons(count: u64) -> Vec<[f32; 3]> {
         nearest: 50,
         max_depth: None,
         roulette: true,
+        guidance: dualight::photons::Guidance::Off,
     };
     let (effects, control) = (EffectSet::all(), Control::default());
     let found = follow_photons(

@@ -10,6 +10,8 @@ pub use photon_file::{PhotonFile, load_photons, save_photons};
 pub use prepared::{Prepared, prepare};
 pub use progressive::{Progressive, Session, Standing};
 
+use std::sync::Arc;
+
 use clock::Clock;
 use foreseen::{hindrance, plan_layer};
 use progressive::Forecast;
@@ -22,16 +24,20 @@ use crate::error::{Error, Result};
 use crate::film::{Component, Film};
 use crate::integrators::{
     IntegratorSettings, PhotonNeeds, PixelPlan, Region, RenderContext, Spacing, Visibility,
-    camera_pass, enclosed, keeps, none_meets_another, planned_camera_pass,
+    camera_pass, enclosed, keeps, none_meets_another, planned_camera_pass, sights,
 };
 use crate::photons::{
-    PhotonKey, PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS, trace_photons,
+    Guidance, GuideBy, PhotonKey, PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS,
+    trace_photons,
 };
 use crate::plugins::Registry;
 use crate::sampling::hash2;
 use crate::scene::Scene;
 use crate::stats::tally::Meter;
 use crate::stats::{PhotonCounts, RayCounts, Statistics, peak_memory};
+
+/// Paths through the image, along each edge, that tell photons what is seen.
+const VIEWS: u32 = 96;
 
 /// How camera samples are shared among pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -215,7 +221,7 @@ fn render_in_pool(
         clock.lap("pilot");
     }
 
-    let first = PhotonSettings {
+    let mut first = PhotonSettings {
         seed: options.seed,
         global: match integrator.photons {
             PhotonNeeds::All => options.photons,
@@ -225,6 +231,10 @@ fn render_in_pool(
         nearest: options.nearest,
         max_depth: options.max_depth,
         roulette: options.roulette,
+        guidance: match options.guide {
+            GuideBy::Off => Guidance::Off,
+            GuideBy::Light | GuideBy::View => Guidance::Light,
+        },
     };
     let wanted = effects.set.intersects(match integrator.photons {
         PhotonNeeds::None => EffectSet::empty(),
@@ -254,6 +264,11 @@ fn render_in_pool(
             "independent passes have photons of their own, each other ones; leave out the file of \
              photons"
                 .into(),
+        ));
+    }
+    if session.photons.is_some() && options.guide == GuideBy::View {
+        return Err(Error::Usage(
+            "photons that a file keeps must not depend on the camera; guide them by light".into(),
         ));
     }
     let gather = options.gather_rays > 0 || integrator.photons == PhotonNeeds::Caustic;
@@ -296,6 +311,11 @@ fn render_in_pool(
             false => unguarded,
         };
     let visibility = Visibility::learn(scene, accel, &*camera, &spacing, options.seed);
+    if wanted && options.guide == GuideBy::View {
+        let seen = sights(scene, accel, &*camera, &spacing, options.seed, VIEWS);
+        first.guidance = Guidance::View(Arc::new(seen));
+        clock.lap("sights");
+    }
     while done < settings.spp && control.stopped().is_none() && !standing.reached(target) {
         let mut samples = settings.spp - done;
         let mut maps = PhotonMaps::default();

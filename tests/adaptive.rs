@@ -40,6 +40,7 @@ fn with_source<R>(
         seed,
         purpose,
         count,
+        guide: None,
     }))
 }
 

@@ -40,6 +40,7 @@ fn compare(scene: &Scene, subject: &dyn Accelerator, rays: u64) -> Agreement {
             seed: 1,
             purpose,
             count: 1 << 16,
+            guide: None,
         })
     });
     let maker = RayMaker {

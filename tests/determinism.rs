@@ -82,6 +82,7 @@ fn maps(scene: &Scene, backend: usize, seed: u64, threads: usize) -> PhotonMaps 
         nearest: 50,
         max_depth: None,
         roulette: true,
+        guidance: dualight::photons::Guidance::Light,
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     pool.expect("threads").install(|| {

@@ -168,6 +168,7 @@ fn maps(scene: &Scene, accel: &dyn Accelerator, photons: u64) -> PhotonMaps {
         nearest: 50,
         max_depth: None,
         roulette: true,
+        guidance: dualight::photons::Guidance::Off,
     };
     let (all, control) = (EffectSet::all(), Control::default());
     trace_photons(scene, accel, &EMISSIONS[0], all, &settings, false, &control)

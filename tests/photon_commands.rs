@@ -139,6 +139,7 @@ fn the_counts_of_the_reproduction_are_still_true() {
                 nearest: 50,
                 max_depth: None,
                 roulette: true,
+                guidance: dualight::photons::Guidance::Off,
             };
             let source = (emission.build)(&EmissionContext {
                 scene: &scene,
@@ -146,6 +147,7 @@ fn the_counts_of_the_reproduction_are_still_true() {
                 seed: settings.seed,
                 purpose,
                 count: contestant.photons[map],
+                guide: None,
             });
             let control = Control::default();
             let counts = follow_photons(

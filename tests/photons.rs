@@ -34,6 +34,7 @@ fn settings(seed: u64, photons: u64) -> PhotonSettings {
         nearest: 50,
         max_depth: None,
         roulette: true,
+        guidance: dualight::photons::Guidance::Off,
     }
 }
 

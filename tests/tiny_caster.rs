@@ -63,6 +63,7 @@ fn with_source<R>(
         seed,
         purpose,
         count,
+        guide: None,
     }))
 }
 
@@ -86,6 +87,7 @@ fn caustic_pass(name: &str, scene: &Scene, seed: u64, count: u64) -> Pass {
         nearest: 50,
         max_depth: None,
         roulette: true,
+        guidance: dualight::photons::Guidance::Off,
     };
     let start = cpu_seconds().unwrap_or(0.0);
     let told = (seed, Purpose::Caustic, count);

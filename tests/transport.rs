@@ -58,6 +58,7 @@ fn maps(scene: &Scene, photons: u64, seed: u64) -> PhotonMaps {
         nearest: 50,
         max_depth: None,
         roulette: true,
+        guidance: dualight::photons::Guidance::Off,
     };
     let emission = registry.emissions.choose(None).unwrap();
     trace_photons(

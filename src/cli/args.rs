@@ -10,6 +10,7 @@ use super::measure_args::{AccuracyArgs, BenchArgs};
 use super::photon_args::{PhotonsArgs, ReproduceArgs};
 use super::quality::Quality;
 use super::values::{self, Crop, Size};
+use crate::photons::GuideBy;
 use crate::pipeline::PixelSampling;
 use crate::report::ErrorMap;
 
@@ -240,6 +241,9 @@ pub struct RenderArgs {
     /// How photons leave the lights [see dualight plugins]
     #[arg(long, value_name = "NAME", help_heading = "Photons")]
     pub emission: Option<String>,
+    /// What emission is guided by [default: view; light with --time, --frame and files of photons]
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Photons")]
+    pub guide: Option<GuideBy>,
     /// Keep the photon maps in FILE. An image of more than 16 samples per pixel takes new photons
     /// now and then; kept are the first
     #[arg(

@@ -142,6 +142,7 @@ fn compare(
                     seed: args.seed,
                     purpose,
                     count: PHOTONS,
+                    guide: None,
                 })
             });
             let maker = RayMaker {

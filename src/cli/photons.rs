@@ -82,6 +82,7 @@ fn look(
         nearest: settings.integrator_settings.nearest,
         max_depth: None,
         roulette: true,
+        guidance: crate::photons::Guidance::Off,
     };
     let view = View {
         scene,

@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUnits, SolidGlass};
 use crate::integrators::{IntegratorEntry, IntegratorSettings, PhotonNeeds};
 use crate::output::{self, OutputSettings};
+use crate::photons::GuideBy;
 use crate::pipeline::{PhotonFile, PixelSampling, Progressive, RenderSettings};
 use crate::plugins::Registry;
 use crate::scene::{Omit, Scene};
@@ -170,6 +171,7 @@ impl Plan {
             || a.nearest.is_some()
             || a.gather.is_some()
             || a.emission.is_some()
+            || a.guide.is_some()
             || self.photons.is_some()
     }
 
@@ -185,6 +187,7 @@ impl Plan {
             ("--caustic-photons", photons && a.caustic_photons.is_some()),
             ("--nearest", photons && a.nearest.is_some()),
             ("--emission", photons && a.emission.is_some()),
+            ("--guide", photons && a.guide.is_some()),
             ("--save-photons", photons && a.save_photons.is_some()),
             ("--load-photons", photons && a.load_photons.is_some()),
         ]
@@ -260,9 +263,21 @@ fn integrator_settings(args: &RenderArgs, size: Size) -> IntegratorSettings {
         photons: args.photons.unwrap_or(defaults.photons),
         caustic_photons: args.caustic_photons.unwrap_or(defaults.caustic_photons),
         nearest: args.nearest.map_or(defaults.nearest, |n| n as usize),
+        guide: args.guide.unwrap_or_else(|| guide(args)),
         gather_rays: args.gather.unwrap_or(defaults.gather_rays),
         background: args.background,
         shadow_rays: args.shadow_rays.unwrap_or(defaults.shadow_rays),
+    }
+}
+
+/// What photons are guided by if nobody says: those of an animation's frames, and those that files
+/// keep, are the same whoever looks.
+fn guide(args: &RenderArgs) -> GuideBy {
+    let kept = args.save_photons.is_some() || args.load_photons.is_some();
+    let animated = args.scene.time.is_some() || args.scene.frame.is_some();
+    match kept || animated {
+        true => GuideBy::Light,
+        false => GuideBy::View,
     }
 }
 

@@ -183,6 +183,7 @@ pub(super) fn json(s: &Summary) -> String {
             "integrator_reason": s.integrator_reason,
             "accelerator": r.accelerator,
             "emission": r.emission,
+            "guide": i.guide.name(),
             "pixel_sampling": r.pixel_sampling.name(),
             "interpolation": r.interpolation,
             "not_interpolated": s.rendering.not_interpolated,

@@ -15,6 +15,7 @@ mod pixel_glints;
 mod pixel_plan;
 mod pixel_shares;
 mod settings;
+mod sights;
 mod stored_light;
 mod trials;
 mod visibility;
@@ -25,6 +26,7 @@ pub use noise::noise;
 pub use outlook::{Outlook, Trial};
 pub use pixel_plan::{PixelPlan, planned_camera_pass};
 pub use settings::IntegratorSettings;
+pub use sights::sights;
 pub use trials::{enclosed, none_meets_another};
 pub use visibility::Visibility;
 

@@ -16,6 +16,9 @@ const NOISE_OF_INDIRECT: f64 = 2.0;
 /// The same where indirect light is not interpolated.
 const NOISE_OF_INDIRECT_ALONE: f64 = 4.0;
 
+/// A trial that is off by more than this factor is clear.
+const CLEAR: f64 = 3.0;
+
 /// A scene, and how its light behaves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
@@ -30,9 +33,9 @@ pub struct Outlook {
 /// What a few paths and photons tell of a scene's light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Trial {
-    /// Share of the light that reaches diffuse surfaces which does so by way of mirrors and glass.
+    /// Share of the light on diffuse surfaces in sight that comes by way of mirrors and glass.
     pub caustics: f64,
-    /// Relative variance of a path's sample, by [`Component`].
+    /// Relative variance of a path's sample, by [`Component`]; zero where caustics alone decide.
     pub noise: [f64; 4],
     /// Whether indirect light would be interpolated if it came from photons.
     pub interpolated: bool,
@@ -56,6 +59,19 @@ impl Outlook {
                 .intersects(EffectSet::CAUSTICS | EffectSet::INDIRECT)
     }
 
+    /// Whether photons pay for the sake of caustics, whatever the noise of paths.
+    pub fn pays_by_caustics(&self) -> bool {
+        let caustics = self.trial.map(|t| Trial {
+            noise: [0.0; 4],
+            ..t
+        });
+        let outlook = Self {
+            trial: caustics,
+            ..self.clone()
+        };
+        caustics.is_some() && outlook.wants_photons().is_some()
+    }
+
     /// Why photons should be traced; `None` if paths from the camera do as well.
     pub(super) fn wants_photons(&self) -> Option<String> {
         let sharp = self.census.sharp_objects;
@@ -73,12 +89,8 @@ impl Outlook {
         if caustics && trial.caustics > least {
             return Some(format!("{}, {share:.1} % of the light", throw()));
         }
-        let most = match trial.interpolated {
-            true => NOISE_OF_INDIRECT,
-            false => NOISE_OF_INDIRECT_ALONE,
-        };
         let noise = 100.0 * trial.noise_of_indirect();
-        (trial.noise_brought() > most)
+        (trial.noise_brought() > trial.most())
             .then(|| format!("indirect light makes {noise:.0} % of the noise of paths"))
     }
 
@@ -104,6 +116,20 @@ impl Outlook {
 }
 
 impl Trial {
+    /// Whether noise is so far from where photons begin to pay that more samples would tell the same.
+    pub fn is_clear(&self) -> bool {
+        let ratio = self.noise_brought() / self.most();
+        !(1.0 / CLEAR..=CLEAR).contains(&ratio)
+    }
+
+    /// Noise brought from which on photons pay.
+    fn most(&self) -> f64 {
+        match self.interpolated {
+            true => NOISE_OF_INDIRECT,
+            false => NOISE_OF_INDIRECT_ALONE,
+        }
+    }
+
     fn noise_by(&self, c: Component) -> f64 {
         self.noise[c as usize]
     }

@@ -1,5 +1,7 @@
 //! What integrators are told.
 
+use crate::photons::GuideBy;
+
 /// Settings of an integrator and of the photon pass it may need.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IntegratorSettings {
@@ -15,6 +17,8 @@ pub struct IntegratorSettings {
     pub caustic_photons: u64,
     /// Photons in a density estimate.
     pub nearest: usize,
+    /// What the emission of photons is guided by.
+    pub guide: GuideBy,
     /// Final-gather rays per camera sample; 0 shows the global map directly.
     pub gather_rays: u32,
     /// Shadow rays per camera sample at the first diffuse surface.
@@ -32,6 +36,7 @@ impl Default for IntegratorSettings {
             photons: 1_000_000,
             caustic_photons: 1_000_000,
             nearest: 50,
+            guide: GuideBy::default(),
             gather_rays: 4,
             shadow_rays: 2,
             background: true,

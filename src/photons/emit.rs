@@ -1,6 +1,6 @@
 //! How photons leave the lights: the trait and its table.
 
-use super::{adaptive, adaptive_linear, uniform};
+use super::{Guide, adaptive, adaptive_linear, uniform};
 use crate::accel::Accelerator;
 use crate::color::Rgb;
 use crate::geometry::Ray;
@@ -38,6 +38,9 @@ pub struct EmissionContext<'a> {
     pub purpose: Purpose,
     /// How many photons to emit, about.
     pub count: u64,
+    /// Where photons bring most, if that was learnt. An emission that follows it divides powers by its
+    /// density.
+    pub guide: Option<&'a Guide>,
 }
 
 /// A numbered set of photons whose powers sum to the flux of the lights in expectation. Photon

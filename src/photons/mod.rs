@@ -16,6 +16,7 @@ mod adaptive;
 mod adaptive_linear;
 mod departure;
 mod emit;
+mod guide;
 mod in_order;
 mod ledger;
 pub mod map;
@@ -28,6 +29,8 @@ mod uniform;
 
 pub(crate) use adaptive::{Beam, Caster, Sight, casters};
 pub use emit::{EMISSIONS, EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
+use guide::Teacher;
+pub use guide::{Guidance, Guide, GuideBy, Sights};
 pub use ledger::Ledger;
 pub use map::{IrradianceMap, PhotonMap};
 use map::{Pilot, Surroundings};
@@ -63,6 +66,8 @@ pub struct PhotonSettings {
     pub max_depth: Option<u32>,
     /// Whether paths end by Russian roulette; otherwise by the depth limit alone.
     pub roulette: bool,
+    /// What emission is guided by.
+    pub guidance: Guidance,
 }
 
 /// Most photons of a map for each one of its pilot emission, which decides the kernels.
@@ -121,7 +126,22 @@ pub fn trace_photons(
 ) -> PhotonMaps {
     let mut maps = PhotonMaps::default();
     let area = map::surface_area(scene);
-    let run = |purpose, settings: &PhotonSettings, maps: &mut PhotonMaps| {
+    let teach = |purpose, maps: &mut PhotonMaps| {
+        let start = Instant::now();
+        let teacher = Teacher {
+            scene,
+            accel,
+            effects,
+            settings,
+            purpose,
+            gathers: gather,
+        };
+        let (guide, sent, rays) = teacher.teach(control);
+        maps.rays.add(&rays);
+        maps.tracing += start.elapsed().as_secs_f64();
+        (guide, sent)
+    };
+    let run = |purpose, settings: &PhotonSettings, guide: Option<&Guide>, maps: &mut PhotonMaps| {
         let start = Instant::now();
         let source = (emission.build)(&EmissionContext {
             scene,
@@ -132,6 +152,7 @@ pub fn trace_photons(
                 Purpose::Global => settings.global,
                 Purpose::Caustic => settings.caustic,
             },
+            guide,
         });
         let pass = follow_photons(scene, accel, &*source, purpose, effects, settings, control);
         maps.rays.add(&pass.rays);
@@ -146,10 +167,11 @@ pub fn trace_photons(
     };
     let start = Instant::now();
     let caustics = |maps: &mut PhotonMaps| {
-        let scout = run(Purpose::Caustic, &pilot, maps);
-        let pass = run(Purpose::Caustic, settings, maps);
+        let (guide, sent) = teach(Purpose::Caustic, maps);
+        let scout = run(Purpose::Caustic, &pilot, guide.as_ref(), maps);
+        let pass = run(Purpose::Caustic, settings, guide.as_ref(), maps);
         maps.caustic_counts = pass.counts;
-        maps.caustic_counts.pilot = pilot.caustic;
+        maps.caustic_counts.pilot = pilot.caustic + sent;
         let deciding = deciding(settings.caustic, pilot.caustic);
         let all = |_| true;
         let kernels = Arc::new(deciding.kernels(scout.photons, area, all, control));
@@ -162,10 +184,11 @@ pub fn trace_photons(
         }
     };
     let global = |maps: &mut PhotonMaps| {
-        let scout = run(Purpose::Global, &pilot, maps);
-        let pass = run(Purpose::Global, settings, maps);
+        let (guide, sent) = teach(Purpose::Global, maps);
+        let scout = run(Purpose::Global, &pilot, guide.as_ref(), maps);
+        let pass = run(Purpose::Global, settings, guide.as_ref(), maps);
         maps.global_counts = pass.counts;
-        maps.global_counts.pilot = pilot.global;
+        maps.global_counts.pilot = pilot.global + sent;
         let map = PhotonMap::build(pass.photons, settings.nearest, area);
         let keep = |class| match gather {
             true => class != PhotonClass::Caustic,

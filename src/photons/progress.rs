@@ -59,6 +59,7 @@ mod tests {
             nearest: 50,
             max_depth: None,
             roulette: true,
+            guidance: crate::photons::Guidance::Off,
         };
         let pass = |n| PhotonPass::new(&first, SAMPLES, n);
         assert_eq!((pass(0).samples, pass(0).photons.seed), (16, 7));

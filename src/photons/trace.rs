@@ -5,6 +5,7 @@ use arrayvec::ArrayVec;
 use super::emit::{PhotonSource, Purpose};
 use super::in_order::in_order;
 use super::ledger::Ledger;
+use super::map::Nearest;
 use super::photon::{Photon, PhotonClass};
 use super::{EmittedPhoton, PhotonSettings};
 use crate::accel::Accelerator;
@@ -21,6 +22,9 @@ use crate::stats::{PhotonCounts, RayCounts};
 
 /// Photons followed by one task: enough to hide the cost of a task, few enough to share evenly.
 const BATCH: u64 = 8192;
+
+/// The same where few photons are followed.
+const LESSONS: u64 = 512;
 
 /// Longest path when neither roulette nor the user ends it.
 const DEPTH_GUARD: u32 = 4096;
@@ -58,10 +62,7 @@ pub fn follow_photons(
     control: &Control,
 ) -> StoredPhotons {
     let n = source.len();
-    let (name, part, event) = match purpose {
-        Purpose::Global => ("global photons", Part::Indirect, Event::GlobalPhotons),
-        Purpose::Caustic => ("caustic photons", Part::Caustics, Event::CausticPhotons),
-    };
+    let (name, part, event) = names(purpose);
     let stage = control.stage(name, "photons", n);
     let tracer = Tracer {
         scene,
@@ -106,6 +107,77 @@ pub fn follow_photons(
         counts,
         rays,
     }
+}
+
+/// What a stage is called, and what it is counted as.
+fn names(purpose: Purpose) -> (&'static str, Part, Event) {
+    match purpose {
+        Purpose::Global => ("global photons", Part::Indirect, Event::GlobalPhotons),
+        Purpose::Caustic => ("caustic photons", Part::Caustics, Event::CausticPhotons),
+    }
+}
+
+/// What became of one photon.
+pub(super) struct Outcome<'a> {
+    /// What it left with.
+    pub(super) power: Rgb,
+    /// What was stored of it, as in [`StoredPhotons`].
+    pub(super) photons: &'a [Photon],
+    pub(super) glow: &'a [Photon],
+}
+
+/// Follows the photons of a source and stores none: what `tell` has to say of the outcome of each, in
+/// their order, and the rays traced. There is no outcome of what did not leave.
+#[expect(clippy::too_many_arguments, reason = "plain input, each used once")]
+pub(super) fn outcomes<T: Copy + Send>(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    source: &dyn PhotonSource,
+    purpose: Purpose,
+    effects: EffectSet,
+    settings: &PhotonSettings,
+    tell: impl Fn(u64, Option<Outcome<'_>>, &mut Nearest) -> T + Sync,
+    control: &Control,
+) -> (Vec<T>, RayCounts) {
+    let n = source.len();
+    let (name, part, _) = names(purpose);
+    let stage = control.stage(name, "lessons", n);
+    let tracer = Tracer {
+        scene,
+        accel,
+        purpose,
+        effects,
+        settings,
+    };
+    let (mut told, mut rays) = (Vec::new(), RayCounts::default());
+    let follow = |b: u64| {
+        let (mut batch, mut found) = (Batch::default(), Nearest::new());
+        let (lo, hi) = (b * LESSONS, ((b + 1) * LESSONS).min(n));
+        let mut out = Vec::new();
+        if control.stopped().is_none() {
+            out.extend((lo..hi).map(|i| {
+                batch.photons.clear();
+                batch.glow.clear();
+                let outcome = source.emit(i).map(|photon| {
+                    tracer.follow(&photon, i, &mut batch);
+                    Outcome {
+                        power: photon.power,
+                        photons: &batch.photons,
+                        glow: &batch.glow,
+                    }
+                });
+                tell(i, outcome, &mut found)
+            }));
+        }
+        stage.advance(hi - lo);
+        tally::rays(part, batch.segments);
+        (out, batch.segments)
+    };
+    in_order(n.div_ceil(LESSONS), follow, |(part, segments)| {
+        told.extend_from_slice(&part);
+        rays.photon += segments;
+    });
+    (told, rays)
 }
 
 /// A photon on its way.

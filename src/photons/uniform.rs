@@ -1,6 +1,7 @@
-//! `uniform`: the conventional emission. Photons are shared among the lights by flux, and each
-//! light's photons are stratified over its surface and its directions.
+//! `uniform`: the conventional emission. Photons are shared among the lights by flux, or as the guide
+//! says, and each light's photons are stratified over its surface and its directions.
 
+use super::Guide;
 use super::departure::leave;
 use super::emit::{EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
 use super::targets::Targets;
@@ -14,6 +15,7 @@ struct Uniform<'a> {
     stream: u64,
     /// Present for caustic photons.
     targets: Option<Targets>,
+    guide: Option<&'a Guide>,
     /// First photon of each light, and the total at the end.
     first: Vec<u64>,
 }
@@ -29,16 +31,26 @@ impl PhotonSource for Uniform<'_> {
         let light = self.scene.light(LightId(k as u32));
         let mut sampler = Sampler::new(self.seed, self.stream, k as u64, i - self.first[k]);
         let (first, second) = (sampler.next_2d(), sampler.next_2d());
+        let (second, density) = match self.guide {
+            None => (second, 1.0),
+            Some(guide) => guide.square(k).place(second),
+        };
         let photon = leave(light, self.scene, self.targets.as_ref(), first, second)?;
         Some(EmittedPhoton {
-            power: photon.power / count as f64,
+            power: photon.power / (count as f64 * density),
             ..photon
         })
     }
 }
 
+/// Fluxes of the lights in W, luminance.
+pub(super) fn fluxes(scene: &Scene) -> Vec<f64> {
+    let lights = scene.lights.iter();
+    lights.map(|l| l.power().luminance()).collect()
+}
+
 /// Shares `count` among lights in proportion to flux; every light with flux gets at least one.
-fn apportion(fluxes: &[f64], count: u64) -> Vec<u64> {
+pub(super) fn apportion(fluxes: &[f64], count: u64) -> Vec<u64> {
     let total: f64 = fluxes.iter().sum();
     let mut first = vec![0u64];
     // Rounding the running sum instead of each share keeps the total within one of `count`.
@@ -61,12 +73,10 @@ fn apportion(fluxes: &[f64], count: u64) -> Vec<u64> {
 }
 
 fn build<'a>(cx: &EmissionContext<'a>) -> Box<dyn PhotonSource + 'a> {
-    let fluxes: Vec<f64> = cx
-        .scene
-        .lights
-        .iter()
-        .map(|l| l.power().luminance())
-        .collect();
+    let shares = match cx.guide {
+        None => fluxes(cx.scene),
+        Some(guide) => guide.shares().to_vec(),
+    };
     let (stream, targets) = match cx.purpose {
         Purpose::Global => (stream::GLOBAL_PHOTONS, None),
         Purpose::Caustic => (stream::CAUSTIC_PHOTONS, Some(Targets::new(cx.scene))),
@@ -79,13 +89,14 @@ fn build<'a>(cx: &EmissionContext<'a>) -> Box<dyn PhotonSource + 'a> {
     let first = if count == 0 {
         vec![0]
     } else {
-        apportion(&fluxes, count)
+        apportion(&shares, count)
     };
     Box::new(Uniform {
         scene: cx.scene,
         seed: cx.seed,
         stream,
         targets,
+        guide: cx.guide,
         first,
     })
 }

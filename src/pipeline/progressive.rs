@@ -174,6 +174,7 @@ mod tests {
             nearest: 50,
             max_depth: None,
             roulette: true,
+            guidance: crate::photons::Guidance::Off,
         }
     }
 

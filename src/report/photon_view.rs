@@ -78,6 +78,7 @@ impl View<'_> {
                 seed: settings.seed,
                 purpose,
                 count: [settings.global, settings.caustic][map],
+                guide: None,
             });
             let stored = follow_photons(
                 self.scene,

@@ -184,6 +184,7 @@ fn photons(
         nearest: options.nearest,
         max_depth: options.max_depth,
         roulette: options.roulette,
+        guidance: crate::photons::Guidance::Off,
     };
     pipeline::in_pool(settings.threads, || {
         scene.geometry.prepare();

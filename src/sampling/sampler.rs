@@ -24,6 +24,8 @@ pub mod stream {
     pub const TOOL: u64 = 4;
     /// Pilot photons. No number of a pass, whose seeds are made alike.
     pub const PILOT: u64 = 1 << 40;
+    /// Photons that teach where others are to go; as above.
+    pub const LESSONS: u64 = 1 << 41;
 }
 
 /// Dimension pairs taken from the low-discrepancy sequence.

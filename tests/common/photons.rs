@@ -17,6 +17,7 @@ pub fn caustic_photons(scene: &Scene, seed: u64, n: u64) -> (Vec<Photon>, f64) {
         nearest: 50,
         max_depth: None,
         roulette: true,
+        guidance: dualight::photons::Guidance::Off,
     };
     let (all, control) = (EffectSet::all(), Control::default());
     let maps = trace_photons(scene, &*accel, &EMISSIONS[0], all, &told, false, &control);

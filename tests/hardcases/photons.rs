@@ -47,6 +47,7 @@ fn traced(
         nearest: 50,
         max_depth,
         roulette: true,
+        guidance: dualight::photons::Guidance::Off,
     };
     let (all, control) = (EffectSet::all(), Control::default());
     trace_photons(
@@ -126,6 +127,7 @@ fn beyond_32_bits(scene: &Scene) -> Meter {
         seed: 3,
         purpose: Purpose::Global,
         count: ALL,
+        guide: None,
     });
     let mut m = Meter::default();
     m.see((source.len() as f64 / ALL as f64 - 1.0).abs());

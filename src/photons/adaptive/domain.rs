@@ -57,6 +57,14 @@ impl Cell {
         }
     }
 
+    /// The quarters that lead to it from the whole square.
+    pub(super) fn quarters(self) -> impl Iterator<Item = usize> {
+        let bit = |x: u32, l: u32| (x >> l & 1) as usize;
+        (0..self.level)
+            .rev()
+            .map(move |l| bit(self.x, l) | bit(self.y, l) << 1)
+    }
+
     /// Its share of the square.
     pub(super) fn measure(self) -> f64 {
         0.25f64.powi(self.level as i32)

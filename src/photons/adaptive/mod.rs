@@ -18,8 +18,8 @@ use rayon::prelude::*;
 pub(crate) use self::casters::{Beam, Caster, Sight, casters};
 use self::domain::{Tree, trees};
 use self::plan::{Leaf, Planner};
-use super::Targets;
 use super::emit::{EmissionContext, EmissionEntry, EmittedPhoton, PhotonSource, Purpose};
+use super::{Guide, Targets};
 use crate::geometry::forecast::Order;
 use crate::sampling::{Sampler, hash2, stream};
 
@@ -114,17 +114,13 @@ pub(super) fn emission<'a>(cx: &EmissionContext<'a>, order: Order) -> Box<dyn Ph
         for (i, light) in cx.scene.lights.iter().enumerate() {
             let flux = light.power().luminance();
             if flux > 0.0 {
-                let levels = strata(flux / power * cx.count as f64);
+                let share = cx.guide.map_or(flux / power, |g| g.shares()[i]);
+                let levels = strata(share * cx.count as f64);
                 all.extend(trees(&**light, i as u32, levels, cx.scene, aim.as_ref()));
             }
         }
     }
-    let total: f64 = all.iter().map(|t| t.flux).sum();
-    let per_flux = if total > 0.0 {
-        cx.count as f64 / total
-    } else {
-        0.0
-    };
+    let shares = tree_shares(&all, cx.guide, cx.scene.lights.len());
     let planner = Planner {
         scene: cx.scene,
         accel: cx.accel,
@@ -135,8 +131,9 @@ pub(super) fn emission<'a>(cx: &EmissionContext<'a>, order: Order) -> Box<dyn Ph
     };
     let grown: Vec<_> = all
         .par_iter()
-        .map(|tree| {
-            let photons = tree.flux * per_flux;
+        .zip(&shares)
+        .map(|(tree, share)| {
+            let photons = share * cx.count as f64;
             let least = LEAST_CELLS.min(photons as u64);
             let budget = ((CELLS * photons) as u64).max(least);
             // What one point of a curved light sees says little about the others.
@@ -158,7 +155,7 @@ pub(super) fn emission<'a>(cx: &EmissionContext<'a>, order: Order) -> Box<dyn Ph
         first: vec![0],
         checks,
     };
-    out.allot(&grown, cx.count, cx.purpose);
+    out.allot(&grown, cx, &shares);
     Box::new(out)
 }
 
@@ -169,11 +166,17 @@ impl Adaptive<'_> {
     }
 
     /// Gives each cell its photons.
-    fn allot(&mut self, grown: &[plan::Grown], count: u64, purpose: Purpose) {
-        // What every ray of the probes missed may still be there, faintly.
+    fn allot(&mut self, grown: &[plan::Grown], cx: &EmissionContext<'_>, shares: &[f64]) {
         let flux = |t: usize, leaf: &Leaf| {
-            let mean = self.trees[t].flux;
-            leaf.power.max(FAINTEST * mean) * leaf.cell.measure()
+            let tree = &self.trees[t];
+            match cx.guide {
+                // What every ray of the probes missed may still be there, faintly.
+                None => leaf.power.max(FAINTEST * tree.flux) * leaf.cell.measure(),
+                Some(guide) => {
+                    let square = guide.square(tree.index as usize);
+                    shares[t] * square.mass(leaf.cell.quarters())
+                }
+            }
         };
         let leaves = || {
             let each = grown.iter().enumerate();
@@ -189,7 +192,7 @@ impl Adaptive<'_> {
                 cell: leaf.cell,
             });
             let f = flux(t, leaf);
-            weights.push(match purpose {
+            weights.push(match cx.purpose {
                 // Neyman: in proportion to flux times deviation; the rest evenly.
                 Purpose::Global if spread > 0.0 => {
                     (1.0 - edges) * f / total + edges * f * leaf.weight / spread
@@ -198,7 +201,7 @@ impl Adaptive<'_> {
                 Purpose::Caustic => f * leaf.weight,
             });
         }
-        let scale = scale(&weights, count as f64);
+        let scale = scale(&weights, cx.count as f64);
         let mut acc = 0.0;
         for w in weights {
             // One photon at least keeps the mean, and rounding the running sum the total.
@@ -206,6 +209,24 @@ impl Adaptive<'_> {
             self.first.push(acc.round() as u64);
         }
     }
+}
+
+/// Shares of the photons that go to each tree: by flux, or as the guide says for lights.
+fn tree_shares(trees: &[Tree<'_>], guide: Option<&Guide>, lights: usize) -> Vec<f64> {
+    let mut fluxes = vec![0.0; lights];
+    for tree in trees {
+        fluxes[tree.index as usize] += tree.flux;
+    }
+    let total: f64 = fluxes.iter().sum();
+    let share = |tree: &Tree<'_>| {
+        let light = tree.index as usize;
+        match guide {
+            None => tree.flux / total,
+            Some(guide) => guide.shares()[light] * tree.flux / fluxes[light],
+        }
+    };
+    let finite = |share: f64| if share.is_finite() { share } else { 0.0 };
+    trees.iter().map(|t| finite(share(t))).collect()
 }
 
 /// What to multiply weights by so that they sum to `count`, each counted as one at least. Zero if

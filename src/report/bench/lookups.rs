@@ -73,6 +73,7 @@ impl<'a> Lookups<'a> {
             nearest: NEAREST,
             max_depth: None,
             roulette: true,
+            guidance: crate::photons::Guidance::Off,
         };
         let emission = registry.emissions.find("uniform")?;
         let effects = EffectSet::all();
