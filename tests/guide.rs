@@ -141,21 +141,19 @@ fn errors(scene: &Scene, guides: &[GuideBy]) -> Vec<f64> {
 #[test]
 fn fifty_lamps_do_not_starve_the_one_that_makes_the_caustic() {
     use GuideBy::{Light, Off, View};
-    println!("lamp, others: error alone; in the crowd unguided, by light, by view; over alone");
-    for (strength, others) in [
-        (0.05, Others::Hidden),
-        (1.0, Others::Hidden),
-        (20.0, Others::Hidden),
-        (1.0, Others::Busy),
-    ] {
+    println!("lamp: error alone; in the crowd unguided, by light, by view; over alone");
+    for strength in [0.05, 1.0, 20.0] {
         let alone = errors(&lamps(strength, Others::None), &[Off])[0];
-        let crowd = errors(&lamps(strength, others), &[Off, Light, View]);
+        let crowd = errors(&lamps(strength, Others::Hidden), &[Off, Light, View]);
         let over: Vec<f64> = crowd.iter().map(|e| e / alone).collect();
-        println!("{strength} {others:?}: {alone:.4}; {crowd:.4?}; {over:.2?}");
-        assert!(over[2] < 1.5, "{strength} {others:?}: by view {over:?}");
-        if matches!(others, Others::Hidden) {
-            assert!(over[1] < 1.5, "{strength} {others:?}: by light {over:?}");
-        }
+        println!("{strength}: {alone:.4}; {crowd:.4?}; {over:.2?}");
+        // The weak lamp is starved by far.
+        assert!(
+            strength > 1.0 || over[0] > 3.0,
+            "{strength}: nothing to gain"
+        );
+        assert!(over[1] < 1.5, "{strength}: by light {over:?}");
+        assert!(over[2] < 1.5, "{strength}: by view {over:?}");
     }
 }
 
