@@ -16,7 +16,8 @@ use dualight::effects::EffectSet;
 use dualight::integrators::{Spacing, sights};
 use dualight::math::DVec3;
 use dualight::photons::{
-    EMISSIONS, Guidance, GuideBy, PhotonClass, PhotonMaps, PhotonSettings, trace_photons,
+    EMISSIONS, EmissionEntry, Guidance, GuideBy, PhotonClass, PhotonMaps, PhotonSettings,
+    trace_photons,
 };
 use dualight::pipeline::{self, PhotonFile, RenderSettings, Session};
 use dualight::plugins::Registry;
@@ -157,7 +158,7 @@ fn fifty_lamps_do_not_starve_the_one_that_makes_the_caustic() {
     }
 }
 
-fn maps(scene: &Scene, emission: usize, guide: GuideBy, seed: u64) -> PhotonMaps {
+fn maps(scene: &Scene, emission: &EmissionEntry, guide: GuideBy, seed: u64) -> PhotonMaps {
     let accel = (ACCELERATORS[0].build)(&scene.geometry, 1).unwrap();
     let registry = Registry::builtin();
     let told = RenderSettings::default();
@@ -182,7 +183,6 @@ fn maps(scene: &Scene, emission: usize, guide: GuideBy, seed: u64) -> PhotonMaps
         guidance,
     };
     let (all, control) = (EffectSet::all(), Control::default());
-    let emission = &EMISSIONS[emission];
     trace_photons(scene, &*accel, emission, all, &settings, true, &control)
 }
 
@@ -219,7 +219,7 @@ fn fluxes(maps: &PhotonMaps) -> Vec<(&'static str, f64)> {
 #[test]
 fn guidance_moves_photons_and_no_flux() {
     let scene = lamps(20.0, Others::Hidden);
-    for emission in 0..2 {
+    for emission in &EMISSIONS[..2] {
         let by = |guide| -> Vec<(&'static str, Samples)> {
             let mut out: Vec<(&'static str, Samples)> = Vec::new();
             for seed in 0..64 {
@@ -238,7 +238,7 @@ fn guidance_moves_photons_and_no_flux() {
         let plain = by(GuideBy::Off);
         for guide in [GuideBy::Light, GuideBy::View] {
             for ((name, a), (_, b)) in plain.iter().zip(by(guide)) {
-                let what = format!("{}, {guide:?}, {name}", EMISSIONS[emission].name);
+                let what = format!("{}, {guide:?}, {name}", emission.name);
                 a.assert_agrees(&b, &what, 0.1, 0.0);
             }
         }
@@ -252,7 +252,7 @@ fn the_caustic_map_holds_what_irradiance_leaves_out() {
     for guide in [GuideBy::Off, GuideBy::View] {
         let [mut held, mut left_out] = [Samples::default(), Samples::default()];
         for seed in 0..64 {
-            let maps = maps(&scene, 0, guide, seed);
+            let maps = maps(&scene, &EMISSIONS[0], guide, seed);
             let sum = |map: &Option<dualight::photons::PhotonMap>| {
                 let photons = map.iter().flat_map(|m| m.photons());
                 let caustic = photons.filter(|p| p.class == PhotonClass::Caustic);
@@ -276,7 +276,7 @@ fn guided_photons_carry_the_flux_of_their_lamps() {
     b.add_camera(look_at("perspective", DVec3::ZERO, DVec3::X, 1.0));
     let scene = b.finish().unwrap();
     let flux = 16.0 * std::f64::consts::PI;
-    for emission in 0..2 {
+    for emission in &EMISSIONS[..2] {
         for guide in [GuideBy::Light, GuideBy::View] {
             let carried = Samples::over_seeds(64, |seed| {
                 maps(&scene, emission, guide, seed)
@@ -284,7 +284,7 @@ fn guided_photons_carry_the_flux_of_their_lamps() {
                     .flux_emitted
                     / 3.0
             });
-            let name = EMISSIONS[emission].name;
+            let name = emission.name;
             carried.assert_mean(&format!("{name}, {guide:?}"), flux, 0.01);
         }
     }
