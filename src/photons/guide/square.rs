@@ -100,14 +100,14 @@ impl Square {
         });
         let mut weights = [0.0; 4];
         let mut rest = lessons;
-        for k in 0..4 {
+        for (k, weight) in weights.iter_mut().enumerate() {
             let n = rest.partition_point(|l| quarter(&l.u) <= k);
             let (own, others) = rest.split_at_mut(n);
             rest = others;
             let corner = [0, 1].map(|i| corner[i] + half * (k >> i & 1) as f64);
             let known = known.learn(own, NEIGHBOURHOOD);
             let child;
-            (weights[k], child) = self.grow(own, known, corner, level + 1);
+            (*weight, child) = self.grow(own, known, corner, level + 1);
             self.nodes[node].child[k] = child;
         }
         let most = weights.iter().copied().fold(0.0, f64::max);
