@@ -8,9 +8,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::measure_args::{AccuracyArgs, BenchArgs};
 use super::photon_args::{PhotonsArgs, ReproduceArgs};
-use super::quality::Quality;
 use super::values::{self, Crop, Size};
-use crate::pipeline::PixelSampling;
+use crate::pipeline::{PixelSampling, Quality};
 use crate::report::ErrorMap;
 
 /// A photon-mapping renderer for glTF scenes.
