@@ -5,10 +5,12 @@ mod foreseen;
 mod photon_file;
 mod prepared;
 mod progressive;
+mod quality;
 
 pub use photon_file::{PhotonFile, load_photons, save_photons};
 pub use prepared::{Prepared, prepare};
 pub use progressive::{Progressive, Session, Standing};
+pub use quality::{Quality, sampling_for, settings_for};
 
 use std::sync::Arc;
 
@@ -354,6 +356,14 @@ fn render_in_pool(
             settings: options,
         };
         let integrator = (integrator.build)(context);
+        // The filtering of textures gets as fine as the samples that there are by then.
+        let spacing = match in_passes {
+            true => {
+                let spp = (done + pass.samples).max(SAMPLES_PER_PASS);
+                Spacing::new(settings.width, settings.height, spp)
+            }
+            false => spacing,
+        };
         // Independent passes have their own random numbers; others go on in the same sequence.
         let (seed, range) = match in_passes {
             true => (hash2(options.seed, u64::from(passes)), 0..samples),

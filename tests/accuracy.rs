@@ -5,13 +5,16 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
 
+use clap::ValueEnum;
 use dualight::control::Control;
 use dualight::import::{self, ImportOptions};
-use dualight::pipeline::RenderSettings;
+use dualight::pipeline::{self, PixelSampling, Quality, RenderSettings};
 use dualight::plugins::Registry;
 use dualight::report::accuracy::{
-    self, Analysis, Circumstances, Clock, Study, StudyOptions, methods,
+    self, Analysis, Circumstances, Clock, Preset, Study, StudyOptions, methods,
 };
+
+const METHODS: [&str; 3] = ["path", "photon", "photon+pixels"];
 
 /// A small study of the box, made once.
 fn measured() -> &'static (Study, Analysis) {
@@ -25,14 +28,22 @@ fn measured() -> &'static (Study, Analysis) {
         )
         .unwrap();
         let mut chosen = methods(&registry);
-        chosen.retain(|m| m.name == "path" || m.name == "photon");
+        chosen.retain(|m| METHODS.contains(&m.name.as_str()));
+        let base = RenderSettings {
+            width: 24,
+            height: 20,
+            ..Default::default()
+        };
+        let photon = registry.integrators.find("photon").unwrap();
+        let preset = |quality: &Quality| Preset {
+            quality: *quality,
+            settings: quality.apply(&base, photon),
+            reason: "the test says so".into(),
+        };
         let options = StudyOptions {
             methods: chosen,
-            base: RenderSettings {
-                width: 24,
-                height: 20,
-                ..Default::default()
-            },
+            presets: Quality::value_variants().iter().map(preset).collect(),
+            base: base.clone(),
             repeats: 3,
             budget: 2.0,
             changes: true,
@@ -126,6 +137,48 @@ fn single_changes_do_what_they_say() {
     assert!(samples.time.value > 0.0, "{samples:?}");
 }
 
+/// `--quality` renders the box by photons, and shares out the samples of its pixels: its presets are
+/// on no other curve.
+#[test]
+fn presets_are_marked_on_the_curve_of_what_they_render() {
+    let (study, analysis) = measured();
+    let names = analysis.presets.iter().map(|p| p.preset);
+    assert!(names.eq(["draft", "normal", "high", "reference"]));
+    let marked: Vec<_> = analysis
+        .points
+        .iter()
+        .filter(|p| p.preset.is_some())
+        .collect();
+    // Two rungs are measured however slow the machine is, and the second is the first preset.
+    assert_eq!(marked[0].preset, Some("draft"), "{:?}", analysis.presets);
+    let svg = accuracy::overview(analysis, Clock::Wall, "").svg();
+    for p in &analysis.presets {
+        assert_eq!(p.method.as_deref(), Some("photon+pixels"));
+        let own = marked.iter().find(|m| m.preset == Some(p.preset));
+        let measured = own.map(|m| (m.seconds, m.error()));
+        assert_eq!(p.measured, measured, "{}", p.preset);
+        assert_eq!(svg.contains(&format!(">{}<", p.preset)), own.is_some());
+        let Some(own) = own else {
+            continue;
+        };
+        // What the command line would render by.
+        assert_eq!((own.name.as_str(), own.spp), ("photon+pixels", p.spp));
+        let settings = study.settings.iter().find(|s| s.preset == Some(p.preset));
+        let settings = &settings.unwrap().settings;
+        let quality = Quality::from_str(p.preset, false).unwrap();
+        let of_command = pipeline::settings_for(quality.spp(), 24 * 20);
+        assert_eq!(settings.integrator_settings, of_command);
+        assert_eq!(settings.integrator.as_deref(), Some("photon"));
+        assert_eq!(settings.pixel_sampling, PixelSampling::Adaptive);
+    }
+    // Each is better than the one before.
+    for b in analysis.presets.iter().filter_map(|p| p.times_better) {
+        assert!(b > 1.0, "{b}");
+    }
+    let page = page();
+    assert!(page.contains("the test says so") && page.contains("times longer"));
+}
+
 #[test]
 fn tables_hold_every_point() {
     let (study, analysis) = measured();
@@ -152,8 +205,9 @@ fn tables_hold_every_point() {
     let rows = markdown.lines().filter(|l| l.starts_with('|')).count();
     let parts = analysis.curves.iter().flat_map(|c| &c.components);
     let parts: usize = parts.map(|c| c.times.len()).sum();
-    // Three tables with two lines of head each.
-    assert_eq!(rows, 6 + levels + parts + accuracy::CHANGES.len());
+    // Four tables with two lines of head each.
+    let presets = Quality::value_variants().len();
+    assert_eq!(rows, 8 + levels + parts + presets + accuracy::CHANGES.len());
     let times = accuracy::times_csv(analysis);
     assert_eq!(times.lines().count(), 1 + levels + parts);
     let columns = |l: &str| l.split(',').count();
@@ -271,8 +325,8 @@ fn the_page_works_in_a_browser_without_a_network() {
         (&0.into(), &0.into()),
         "{report}"
     );
-    // Reference, two methods and their errors, and two in the comparison.
-    assert_eq!(report["images"], 7, "{report}");
+    // Reference, the methods and their errors, and two in the comparison.
+    assert_eq!(report["images"], 3 + 2 * METHODS.len(), "{report}");
     assert!(report["plots"].as_u64().unwrap() >= 6, "{report}");
     assert!(report["clip"].as_str().unwrap().contains("75%"), "{report}");
     assert_eq!(report["swapped"], true, "{report}");

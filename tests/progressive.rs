@@ -218,6 +218,28 @@ fn a_film_is_kept_gone_on_with_and_guarded() {
     assert!(!d.join("d.exr").exists());
 }
 
+/// What renders a film is settled when it is begun. Left to itself, the box is rendered by `photon`.
+#[test]
+fn a_film_is_gone_on_with_by_the_integrator_that_began_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let d = directory.path();
+    for integrator in ["path", "hybrid"] {
+        let film = format!("-o a.exr --resume {integrator}.film");
+        let begun = dualight(d, &format!("{film} --spp 4 --integrator {integrator}"));
+        ended(&begun, 0, "begins");
+        for (spp, options) in [(4, ""), (40, "--integrator auto"), (8, "")] {
+            let line = format!("{film} --spp {spp} {options} --json=a.json");
+            ended(&dualight(d, &line), 0, "goes on from");
+            let told: serde_json::Value =
+                serde_json::from_slice(&fs::read(d.join("a.json")).unwrap()).unwrap();
+            assert_eq!(told["settings"]["integrator"], integrator, "{told}");
+        }
+        // Another one that is named has no use for it.
+        let other = dualight(d, &format!("{film} --spp 4 --integrator photon"));
+        ended(&other, 1, "other settings");
+    }
+}
+
 /// A scene of several files is another one if any of them changes.
 #[test]
 fn a_film_is_not_gone_on_with_if_a_buffer_changed() {

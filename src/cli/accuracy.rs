@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use clap::ValueEnum;
+
+use super::choice::suited_to;
 use super::measure_args::AccuracyArgs;
 use super::plan::{default_size, import_options};
 use super::render::command_line;
@@ -10,11 +13,12 @@ use super::{Ending, console, machine, progress, signal};
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::import;
+use crate::integrators::with_photons;
 use crate::output;
-use crate::pipeline::RenderSettings;
+use crate::pipeline::{Quality, RenderSettings};
 use crate::plugins::Registry;
 use crate::report::accuracy::{
-    self, Analysis, Circumstances, Method, Study, StudyOptions, methods,
+    self, Analysis, Circumstances, Method, Preset, Study, StudyOptions, methods,
 };
 use crate::scene::{Census, Scene};
 
@@ -65,6 +69,7 @@ pub(super) fn run(args: &AccuracyArgs) -> Result<Ending> {
         repeats: args.seeds as usize,
         budget: args.budget.as_secs_f64(),
         changes: !args.no_changes,
+        presets: presets(&scene, &base, &registry, &control)?,
         reference: args.reference.clone(),
         reference_error: args.reference_error,
         exposure: args.exposure,
@@ -117,6 +122,30 @@ fn choose(names: &[String], registry: &Registry) -> Result<Vec<Method>> {
                         .collect::<Vec<_>>()
                         .join(", "),
                 })
+        })
+        .collect()
+}
+
+/// What `render --quality` would do with the scene.
+fn presets(
+    scene: &Scene,
+    base: &RenderSettings,
+    registry: &Registry,
+    control: &Control,
+) -> Result<Vec<Preset>> {
+    let table = &registry.integrators;
+    let photons = with_photons(table).unwrap_or(table.choose(None)?);
+    let mut prepared = None;
+    Quality::value_variants()
+        .iter()
+        .map(|quality| {
+            let settings = quality.apply(base, photons);
+            let (name, reason) = suited_to(scene, &settings, registry, &mut prepared, control)?;
+            Ok(Preset {
+                quality: *quality,
+                settings: quality.apply(base, table.find(name)?),
+                reason,
+            })
         })
         .collect()
 }

@@ -8,10 +8,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::measure_args::{AccuracyArgs, BenchArgs};
 use super::photon_args::{PhotonsArgs, ReproduceArgs};
-use super::quality::Quality;
 use super::values::{self, Crop, Size};
 use crate::photons::GuideBy;
-use crate::pipeline::PixelSampling;
+use crate::pipeline::{PixelSampling, Quality};
 use crate::report::ErrorMap;
 
 /// A photon-mapping renderer for glTF scenes.

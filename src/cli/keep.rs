@@ -21,6 +21,7 @@ pub(super) struct Keeper<'a> {
     plan: &'a Plan,
     registry: &'a Registry,
     seed: u64,
+    integrator: String,
     identity: u64,
     start: Instant,
     written: Instant,
@@ -44,6 +45,7 @@ impl<'a> Keeper<'a> {
             plan,
             registry,
             seed: settings.integrator_settings.seed,
+            integrator: settings.integrator.clone().unwrap_or_default(),
             identity,
             start,
             written: start,
@@ -95,7 +97,8 @@ impl<'a> Keeper<'a> {
             render_seconds: self.start.elapsed().as_secs_f64(),
         };
         if let Some(path) = &self.plan.resume {
-            Checkpoint::write(path, self.identity, self.seconds, film)?;
+            let (by, identity) = (&self.integrator, self.identity);
+            Checkpoint::write(path, by, identity, self.seconds, film)?;
         }
         let image = film.develop();
         let (outputs, settings) = (&self.registry.outputs, &self.plan.output_settings);

@@ -24,7 +24,8 @@ pub struct AccuracyArgs {
     /// Methods, the first being what the others are compared with [default: all there are]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub methods: Vec<String>,
-    /// Image to judge by (.exr), of the same size [default: computed by path]
+    /// Image to judge by (.exr), of the same size; one rendered in passes (by --target-error or
+    /// --time-limit) tells its own error [default: computed by path]
     #[arg(long, value_name = "FILE.exr")]
     pub reference: Option<PathBuf>,
     /// Error of a computed reference, as a part of the smallest error measured

@@ -18,7 +18,6 @@ mod photons;
 pub mod plan;
 mod plugins;
 pub mod progress;
-pub mod quality;
 mod render;
 mod reproduce;
 mod signal;

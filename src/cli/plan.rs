@@ -12,7 +12,9 @@ use crate::import::{EnvironmentOption, EnvironmentSource, ImportOptions, LightUn
 use crate::integrators::{IntegratorEntry, IntegratorSettings, PhotonNeeds};
 use crate::output::{self, OutputSettings};
 use crate::photons::GuideBy;
-use crate::pipeline::{PhotonFile, PixelSampling, Progressive, RenderSettings};
+use crate::pipeline::{
+    PhotonFile, PixelSampling, Progressive, RenderSettings, sampling_for, settings_for,
+};
 use crate::plugins::Registry;
 use crate::scene::{Omit, Scene};
 
@@ -158,11 +160,6 @@ impl Plan {
         named_integrator(&self.args)
     }
 
-    /// The wish for effects.
-    pub fn effects(&self) -> &str {
-        &self.settings.effects
-    }
-
     /// Whether an option was given that only photons have a use for.
     pub fn asks_for_photons(&self) -> bool {
         let a = &self.args;
@@ -224,13 +221,13 @@ impl Plan {
         })
     }
 
-    /// Adaptive where that is faster to the same error.
     fn pixel_sampling_for(&self, integrator: &IntegratorEntry) -> PixelSampling {
-        let gains = integrator.photons == PhotonNeeds::All && self.settings.progressive.is_none();
-        self.args.pixel_sampling.unwrap_or(match gains {
-            true => PixelSampling::Adaptive,
-            false => PixelSampling::Uniform,
-        })
+        self.args
+            .pixel_sampling
+            .unwrap_or(match self.settings.progressive {
+                None => sampling_for(integrator),
+                Some(_) => PixelSampling::Uniform,
+            })
     }
 
     fn check_crop(&self, size: Size) -> Result<()> {
@@ -253,9 +250,8 @@ fn named_integrator(args: &RenderArgs) -> Option<&str> {
 
 /// What was asked for, and for the rest what suits an image of that size.
 fn integrator_settings(args: &RenderArgs, size: Size) -> IntegratorSettings {
-    let defaults = args
-        .quality
-        .settings(u64::from(size.width) * u64::from(size.height));
+    let pixels = u64::from(size.width) * u64::from(size.height);
+    let defaults = settings_for(args.quality.spp(), pixels);
     IntegratorSettings {
         seed: args.seed,
         max_depth: args.max_depth,

@@ -6,7 +6,8 @@ use super::Study;
 use super::curves::{Curve, curves, floor, resolved};
 use super::layers::{Moments, Scale, names};
 use super::measure::{Kind, Run};
-use super::methods::{CHANGES, preset};
+use super::methods::CHANGES;
+use super::presets::{Standing, standings};
 use crate::report::diff::Pair;
 use crate::report::statistics::{Interval, bootstrap, mean, mean_interval, median};
 
@@ -105,7 +106,7 @@ pub struct Analysis {
     /// Factors that an A/A comparison keeps below: of seconds, of errors, of their product. No
     /// time is told from another by less than the clock's step.
     pub floor: [f64; 3],
-    /// All points: methods by rung, then the base of the changes and the changes.
+    /// All points: methods by rung, presets that are no rung, the base of the changes and the changes.
     pub points: Vec<Point>,
     /// A curve per method.
     pub curves: Vec<Curve>,
@@ -113,6 +114,8 @@ pub struct Analysis {
     pub effects: Vec<Effect>,
     /// What the changes are made to.
     pub base: Option<String>,
+    /// What the presets are.
+    pub presets: Vec<Standing>,
 }
 
 impl Analysis {
@@ -239,6 +242,7 @@ fn point(study: &Study, setting: usize, scale: &Scale) -> Point {
     let trimmed: Vec<f64> = compared.iter().map(|c| c.rel_mse_trimmed).collect();
     let (name, rung) = match s.kind {
         Kind::Rung { method, rung } => (study.methods[method].name.clone(), Some(rung)),
+        Kind::Preset { method } => (study.methods[method].name.clone(), None),
         Kind::Base => ("unchanged".into(), None),
         Kind::Change(c) => (CHANGES[c].name.into(), None),
         Kind::Again(_) => ("again".into(), None),
@@ -248,7 +252,7 @@ fn point(study: &Study, setting: usize, scale: &Scale) -> Point {
     Point {
         name,
         rung,
-        preset: rung.filter(|_| photons).and_then(preset),
+        preset: s.preset,
         spp: s.settings.spp,
         photons: photons.then_some(i.photons),
         nearest: photons.then_some(i.nearest),
@@ -352,8 +356,14 @@ pub(super) fn analyse(study: &Study) -> Analysis {
     );
     let base = base.map(describe);
     let shown = |p: &Point| !matches!(kind(p), Kind::Again(_));
-    let points = all.iter().filter(|p| shown(p)).cloned().collect();
+    let points: Vec<Point> = all.iter().filter(|p| shown(p)).cloned().collect();
+    let presets = study.presets.iter().map(|(preset, of)| {
+        let method = of.map(|m| study.methods[m].name.as_str());
+        (preset, method)
+    });
+    let presets = standings(presets, &points);
     Analysis {
+        presets,
         floor: floors,
         points,
         curves,

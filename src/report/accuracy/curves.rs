@@ -15,6 +15,8 @@ pub struct Curve {
     pub method: String,
     /// Slope of error over time in logarithms: −1 halves the error in twice the time.
     pub slope: Option<Interval>,
+    /// The same over samples: what does not grow with them counts for nothing in it.
+    pub fall: Option<Interval>,
     /// For each of the levels of the report: seconds to reach it.
     pub times: Vec<Level>,
     /// The same for each component that the scene has.
@@ -134,19 +136,26 @@ pub(super) fn curves(
             let whole = times.next().map(|c| c.times).unwrap_or_default();
             Curve {
                 method: method.name.clone(),
-                slope: bootstrap(repeats(ladder), |picks| {
-                    let points: Vec<(f64, f64)> = over(ladder, 0, picks)
-                        .into_iter()
-                        .filter(|p| p.1 > 0.0)
-                        .map(|(t, e)| (t.ln(), e.ln()))
-                        .collect();
-                    slope(&points)
-                }),
+                slope: slope_over(ladder, |_, seconds| seconds),
+                fall: slope_over(ladder, |p, _| f64::from(p.spp)),
                 times: whole,
                 components: times.filter(|c| !c.times.is_empty()).collect(),
             }
         })
         .collect()
+}
+
+/// Slope of the error over something, in logarithms.
+fn slope_over(ladder: &[&Point], x: impl Fn(&Point, f64) -> f64) -> Option<Interval> {
+    bootstrap(repeats(ladder), |picks| {
+        let points: Vec<(f64, f64)> = ladder
+            .iter()
+            .zip(over(ladder, 0, picks))
+            .filter(|(_, (_, error))| *error > 0.0)
+            .map(|(p, (seconds, error))| (x(p, seconds).ln(), error.ln()))
+            .collect();
+        slope(&points)
+    })
 }
 
 /// The factor that two measurements of the same keep below. Whichever way chance went, it could

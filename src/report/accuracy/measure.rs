@@ -2,8 +2,9 @@
 
 use std::time::Instant;
 
+use super::StudyOptions;
 use super::layers::Layers;
-use super::methods::{CHANGES, MOST_RUNGS, Method, STEP};
+use super::methods::{CHANGES, MOST_CHANGED, MOST_RUNGS, STEP};
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::pipeline::{self, RenderSettings};
@@ -37,6 +38,11 @@ pub enum Kind {
         /// Rung, 0 the coarsest.
         rung: u32,
     },
+    /// A preset that is no rung of its method.
+    Preset {
+        /// Index of the method.
+        method: usize,
+    },
     /// What the changes are made to.
     Base,
     /// One change to it.
@@ -50,10 +56,14 @@ pub enum Kind {
 pub struct Setting {
     /// What for.
     pub kind: Kind,
+    /// The preset that it is, if any.
+    pub preset: Option<&'static str>,
     /// The settings, but for the seed.
     pub settings: RenderSettings,
     /// Seconds that it will take, by estimate.
     pub expected: f64,
+    /// How often it is rendered, each time with another seed.
+    pub repeats: usize,
 }
 
 /// Renders with what all measurements share.
@@ -89,100 +99,136 @@ fn seeded(settings: &RenderSettings, setting: usize, repeat: usize) -> RenderSet
     s
 }
 
+/// Seconds that a method takes, by its two coarsest rungs: some whatever is asked for, and some for each
+/// of the samples.
+struct Pace {
+    /// Samples of the coarsest rung.
+    spp: f64,
+    fixed: f64,
+    /// Seconds of the coarsest rung's samples.
+    samples: f64,
+}
+
+impl Pace {
+    /// From the seconds of the two coarsest rungs. Their difference is mostly noise where pictures are
+    /// small, so some of the time always grows.
+    fn new(spp: u32, [first, second]: [f64; 2]) -> Self {
+        let samples = ((second - first) / (STEP - 1.0)).clamp(first / STEP, first);
+        Self {
+            spp: f64::from(spp),
+            fixed: first - samples,
+            samples,
+        }
+    }
+
+    fn seconds(&self, spp: u32) -> f64 {
+        self.fixed + self.samples * f64::from(spp) / self.spp
+    }
+}
+
 /// What is to be measured within `budget` seconds: for each method as many rungs as fit its
-/// share, every change, and the A/A pair. The estimates come from the coarsest rungs, rendered
-/// once.
+/// share, the presets, every change, and the A/A pair. The estimates come from the coarsest rungs,
+/// rendered once. `presets` holds the method of each preset.
 pub(super) fn plan(
     renderer: &Renderer<'_>,
-    methods: &[Method],
-    base: &RenderSettings,
-    repeats: usize,
-    changes: bool,
+    options: &StudyOptions,
+    presets: &[Option<usize>],
     budget: f64,
 ) -> Result<Option<Vec<Setting>>> {
+    let StudyOptions {
+        methods,
+        base,
+        repeats,
+        changes,
+        ..
+    } = options;
     let stage = renderer
         .control
         .stage("pilot", "pictures", methods.len() as u64);
-    let mut ladders = Vec::new();
-    for (method, m) in methods.iter().enumerate() {
-        // Once to warm up: caches, the clock of the processor, pages of memory.
-        for _ in 0..2 {
-            let settings = m.settings(base, 0);
-            let Some((_, seconds, _)) = renderer.render(&settings)? else {
+    let mut paces = Vec::new();
+    for m in methods {
+        let mut seconds = [0.0; 2];
+        // First to warm up: caches, the clock of the processor, pages of memory.
+        for (k, rung) in [(0, 0), (0, 0), (1, 1)] {
+            let Some((_, took, _)) = renderer.render(&m.settings(base, rung))? else {
                 return Ok(None);
             };
-            ladders.truncate(method);
-            ladders.push(seconds);
+            seconds[k] = took;
         }
+        paces.push(Pace::new(m.settings(base, 0).spp, seconds));
         stage.advance(1);
     }
+    let setting = |kind, settings: RenderSettings, pace: &Pace| Setting {
+        kind,
+        preset: None,
+        expected: pace.seconds(settings.spp),
+        settings,
+        repeats: *repeats,
+    };
     // Of one part each: every method, the changes, the A/A pair.
-    let shares = methods.len() as f64 + if changes { 1.5 } else { 0.5 };
-    let share = budget / shares / repeats as f64;
+    let shares = methods.len() as f64 + if *changes { 1.5 } else { 0.5 };
+    let share = budget / shares / *repeats as f64;
     let mut out = Vec::new();
-    for (method, (m, first)) in methods.iter().zip(&ladders).enumerate() {
+    for (method, (m, pace)) in methods.iter().zip(&paces).enumerate() {
         let mut spent = 0.0;
         for rung in 0..MOST_RUNGS {
-            let expected = first * STEP.powi(rung as i32);
+            let next = setting(Kind::Rung { method, rung }, m.settings(base, rung), pace);
             // Two points make a curve, whatever they cost.
-            if rung >= 2 && spent + expected > share {
+            if rung >= 2 && spent + next.expected > share {
                 break;
             }
-            spent += expected;
-            out.push(Setting {
-                kind: Kind::Rung { method, rung },
-                settings: m.settings(base, rung),
-                expected,
-            });
+            spent += next.expected;
+            out.push(next);
         }
     }
-    let rung_within = |first: f64, seconds: f64| {
-        (0..MOST_RUNGS).rfind(|&r| first * STEP.powi(r as i32) <= seconds)
-    };
-    if let Some(first) = ladders.first() {
-        let rung = rung_within(*first, share / 4.0).unwrap_or(0);
-        for twin in [false, true] {
-            out.push(Setting {
-                kind: Kind::Again(twin),
-                settings: methods[0].settings(base, rung),
-                expected: first * STEP.powi(rung as i32),
-            });
-        }
-    }
-    let photons = methods
+    let of: Vec<_> = options
+        .presets
         .iter()
-        .zip(&ladders)
-        .find(|(m, _)| m.photons(renderer.registry));
-    if let (true, Some((m, first))) = (changes, photons) {
+        .zip(presets.iter().copied())
+        .collect();
+    super::presets::place(&mut out, &of, (budget, *repeats), |m, spp| {
+        paces[m].seconds(spp)
+    });
+    // The finest rung of a method that is had within so many seconds.
+    let within = |method: usize, most: u32, seconds: f64| {
+        let settings = (0..=most).map(|r| methods[method].settings(base, r));
+        let fits = |s: &RenderSettings| paces[method].seconds(s.spp) <= seconds;
+        let coarsest = || methods[method].settings(base, 0);
+        settings.filter(fits).last().unwrap_or_else(coarsest)
+    };
+    if !methods.is_empty() {
+        let settings = within(0, MOST_RUNGS - 1, share / 4.0);
+        for twin in [false, true] {
+            out.push(setting(Kind::Again(twin), settings.clone(), &paces[0]));
+        }
+    }
+    // What presets render by, if there are photons in it, else the first that has any.
+    let photons = |m: &usize| methods[*m].photons(renderer.registry);
+    let of_presets = presets.iter().flatten().copied().find(photons);
+    let changed = of_presets.or_else(|| (0..methods.len()).find(photons));
+    if let (true, Some(method)) = (*changes, changed) {
         // They have one and a half shares, and on average cost one and a half times as much as
         // what they are made to.
-        let rung = rung_within(*first, share / (CHANGES.len() + 1) as f64).unwrap_or(0);
-        let settings = m.settings(base, rung);
-        let expected = first * STEP.powi(rung as i32);
+        let share = share / (CHANGES.len() + 1) as f64;
+        let settings = within(method, MOST_CHANGED, share);
         let kinds = (0..CHANGES.len()).map(Kind::Change);
         for kind in std::iter::once(Kind::Base).chain(kinds) {
-            let mut changed = settings.clone();
+            let mut next = setting(kind, settings.clone(), &paces[method]);
             if let Kind::Change(c) = kind {
-                (CHANGES[c].apply)(&mut changed);
+                (CHANGES[c].apply)(&mut next.settings);
             }
-            out.push(Setting {
-                kind,
-                settings: changed,
-                expected,
-            });
+            out.push(next);
         }
     }
     Ok(Some(out))
 }
 
-/// Renders all settings `repeats` times: first the A/A pair, then the others in turns, in
+/// Renders all settings as often as they ask for: first the A/A pair, then the others in turns, in
 /// another order each time. `None` if stopped.
-pub(super) fn run(
-    renderer: &Renderer<'_>,
-    settings: &[Setting],
-    repeats: usize,
-) -> Result<Option<Vec<Run>>> {
-    let total: f64 = settings.iter().map(|s| s.expected).sum::<f64>() * repeats as f64;
+pub(super) fn run(renderer: &Renderer<'_>, settings: &[Setting]) -> Result<Option<Vec<Run>>> {
+    let all = |s: &Setting| s.expected * s.repeats as f64;
+    let total: f64 = settings.iter().map(all).sum();
+    let repeats = settings.iter().map(|s| s.repeats).max().unwrap_or(0);
     // In milliseconds, as pictures take very different times.
     let stage = renderer
         .control
@@ -194,6 +240,7 @@ pub(super) fn run(
     for group in [again, others] {
         for repeat in 0..repeats {
             let mut order = group.clone();
+            order.retain(|&i| repeat < settings[i].repeats);
             for i in (1..order.len()).rev() {
                 order.swap(i, (rng.next_u64() % (i as u64 + 1)) as usize);
             }

@@ -2,8 +2,7 @@
 //! method or a change is one line.
 
 use crate::integrators::{IntegratorSettings, PhotonNeeds};
-use crate::photons::SAMPLES_PER_PASS;
-use crate::pipeline::{PixelSampling, RenderSettings};
+use crate::pipeline::{PixelSampling, RenderSettings, settings_for};
 use crate::plugins::Registry;
 
 /// Each rung of a ladder costs about so many times the one below.
@@ -11,6 +10,9 @@ pub(super) const STEP: f64 = 4.0;
 
 /// Rungs of the longest ladder.
 pub(super) const MOST_RUNGS: u32 = 7;
+
+/// Finest rung that single changes are made to: of photon mapping, the preset `normal`.
+pub(super) const MOST_CHANGED: u32 = 2;
 
 /// A way to render, with settings from coarse to fine.
 #[derive(Clone, Debug)]
@@ -44,15 +46,6 @@ impl Method {
         let entry = registry.integrators.choose(Some(&self.integrator));
         entry.is_ok_and(|e| e.photons != PhotonNeeds::None)
     }
-}
-
-/// The preset of `--quality` that has the samples and photons of a rung of the ladder, at the size
-/// that pictures have if none is given; smaller ones have as many photons per pixel. Pixels are
-/// sampled adaptively by default.
-pub(super) fn preset(rung: u32) -> Option<&'static str> {
-    ["draft", "normal", "high"]
-        .get(rung.checked_sub(1)? as usize)
-        .copied()
 }
 
 /// Name, sentence, integrator, emission, ladder.
@@ -151,35 +144,25 @@ fn path_ladder(s: &mut RenderSettings, rung: u32) {
     s.spp = 4 << (2 * rung);
 }
 
-/// Camera samples for each photon of a map, as in the default settings.
-const SAMPLES_PER_PHOTON: u64 = 4;
-
-/// Fewest photons of a map.
-const FEWEST_PHOTONS: u64 = 10_000;
-
-/// Samples and photons grow alike. The photons of a density estimate grow with the power 2/3 of
-/// all photons, which balances its noise, `1/k`, and its bias, `(k/N)²` (Knaus and Zwicker 2011).
+/// Samples and photons grow alike, as the presets' do.
 fn photon_ladder(s: &mut RenderSettings, rung: u32) {
     s.spp = 1 << (2 * rung);
-    // Longer renderings trace new photons, and more of them, every so many samples.
-    let of_pass = s.spp.min(SAMPLES_PER_PASS);
-    let samples = u64::from(s.width) * u64::from(s.height) * u64::from(of_pass);
-    let photons = (samples / SAMPLES_PER_PHOTON).max(FEWEST_PHOTONS);
-    set_photons(&mut s.integrator_settings, photons);
+    set_photons(s);
 }
 
-/// As many samples as path tracing, photons as photon mapping.
+/// As many samples as path tracing, and photons for these.
 fn hybrid_ladder(s: &mut RenderSettings, rung: u32) {
-    photon_ladder(s, rung);
     path_ladder(s, rung);
+    set_photons(s);
 }
 
-fn set_photons(s: &mut IntegratorSettings, photons: u64) {
-    let defaults = IntegratorSettings::default();
-    let scale = photons as f64 / defaults.photons as f64;
-    s.photons = photons;
-    s.caustic_photons = photons;
-    s.nearest = ((defaults.nearest as f64 * scale.powf(2.0 / 3.0)).round() as usize).max(8);
+fn set_photons(s: &mut RenderSettings) {
+    let pixels = u64::from(s.width) * u64::from(s.height);
+    let seed = s.integrator_settings.seed;
+    s.integrator_settings = IntegratorSettings {
+        seed,
+        ..settings_for(s.spp, pixels)
+    };
 }
 
 /// One change to the settings of photon mapping.
@@ -266,7 +249,10 @@ pub const CHANGES: &[Change] = &[
 
 #[cfg(test)]
 mod tests {
+    use clap::ValueEnum;
+
     use super::*;
+    use crate::pipeline::Quality;
 
     #[test]
     fn every_method_and_change_names_plugins_there_are_and_rungs_grow() {
@@ -281,6 +267,25 @@ mod tests {
             assert_eq!(f64::from(b.spp), STEP * f64::from(a.spp), "{}", m.name);
             // The finest rung fits its types.
             assert!(m.settings(&base, MOST_RUNGS - 1).spp > b.spp);
+        }
+        // Whatever integrator a preset renders by, it is a rung of a method.
+        for integrator in registry.integrators.entries() {
+            for quality in Quality::value_variants() {
+                let preset = quality.apply(&base, integrator);
+                let is = |m: &Method| {
+                    (0..MOST_RUNGS).any(|k| {
+                        RenderSettings {
+                            emission: None,
+                            ..m.settings(&base, k)
+                        } == preset
+                    })
+                };
+                // Path tracing has no use for photons, so its ladder says nothing of them.
+                let named = |m: &&Method| m.integrator == integrator.name && is(m);
+                let found = all.iter().find(named);
+                let photons = integrator.photons != PhotonNeeds::None;
+                assert!(found.is_some() || !photons, "{preset:?}");
+            }
         }
         for c in CHANGES {
             let mut s = base.clone();

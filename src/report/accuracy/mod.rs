@@ -15,6 +15,7 @@ mod methods;
 mod page;
 mod plots;
 mod precision;
+mod presets;
 mod reference;
 mod tables;
 
@@ -27,6 +28,7 @@ pub use methods::{CHANGES, Change, Method, methods};
 pub use page::page;
 pub use plots::overview;
 pub use precision::with_measured_backends;
+pub use presets::{Preset, Standing};
 pub use reference::Reference;
 pub use tables::{csv, json, markdown, text, times_csv};
 
@@ -55,6 +57,8 @@ pub struct StudyOptions {
     pub budget: f64,
     /// Whether to measure single changes too.
     pub changes: bool,
+    /// The presets, by settings that suit the scene: which points of the curves they are.
+    pub presets: Vec<Preset>,
     /// The reference's file, if it is not to be computed.
     pub reference: Option<PathBuf>,
     /// The error of a computed reference, as a part of the smallest error measured.
@@ -80,6 +84,8 @@ pub struct Study {
     pub exposure: f64,
     /// Which time counts.
     pub clock: Clock,
+    /// The presets, and of each the index of its method.
+    presets: Vec<(Preset, Option<usize>)>,
     photon_integrators: Vec<&'static str>,
 }
 
@@ -121,18 +127,12 @@ pub fn study(
         Some(_) => options.budget,
         None => options.budget * (1.0 - REFERENCE_SHARE),
     };
-    let plan = measure::plan(
-        &renderer,
-        &options.methods,
-        base,
-        options.repeats,
-        options.changes,
-        budget,
-    )?;
+    let of = presets::methods_of(&options.presets, &options.methods, base, registry)?;
+    let plan = measure::plan(&renderer, &options, &of, budget)?;
     let Some(settings) = plan else {
         return Ok(None);
     };
-    let Some(runs) = measure::run(&renderer, &settings, options.repeats)? else {
+    let Some(runs) = measure::run(&renderer, &settings)? else {
         return Ok(None);
     };
     let reference = match file {
@@ -159,6 +159,7 @@ pub fn study(
         reference,
         exposure: options.exposure,
         clock: options.clock,
+        presets: options.presets.into_iter().zip(of).collect(),
         photon_integrators: photon_integrators
             .filter(|e| e.photons != PhotonNeeds::None)
             .map(|e| e.name)

@@ -8,12 +8,13 @@ use base64::Engine;
 use super::analysis::describe;
 use super::curves::{components, whole};
 use super::tables::{COMPONENTS, changes, interval, ratio, seconds, short};
-use super::{Analysis, Circumstances, Point, Study, layers, plots};
+use super::{Analysis, Circumstances, Point, Study, layers, plots, presets};
 use crate::error::Result;
 use crate::film::{Channel, Image, Layer};
 use crate::output::{Metadata, OutputSettings, format_of};
 use crate::plugins::Registry;
 use crate::report::diff::Pair;
+use crate::report::statistics::Interval;
 use crate::report::svg::escape;
 use crate::report::{ErrorMap, error_image};
 
@@ -48,11 +49,13 @@ pub fn page(
     out += &plots::overview(analysis, clock, "Error against time").svg();
     out += "</div>\n";
     out += &times(analysis);
+    out += &of_presets(analysis);
     out += &pictures(study, analysis, registry)?;
     out += "<h2>What the error is made of</h2>\n<p>Noise differs from seed to seed; bias does not. \
             Bias is shown where its interval lies above zero. Errors of components are divided by \
             the whole picture, so they tell what they do to it.</p>\n<div class=\"plots\">";
     out += &plots::parts(analysis, clock).svg();
+    out += &plots::convergence(analysis).svg();
     if let Some(plot) = plots::flip(analysis, clock) {
         out += &plot.svg();
     }
@@ -106,10 +109,10 @@ fn times(analysis: &Analysis) -> String {
     out += "</table>\n";
     out += &of_components(analysis, &faster);
     out += "<table>\n";
-    out += &head(&["method", "slope of error over time"]);
+    out += &head(&["method", "slope of error over time", "over samples"]);
     for c in &analysis.curves {
-        let slope = c.slope.as_ref().map_or("unknown".into(), interval);
-        out += &row([c.method.clone(), slope], "td");
+        let cell = |slope: &Option<Interval>| slope.as_ref().map_or("unknown".into(), interval);
+        out += &row([c.method.clone(), cell(&c.slope), cell(&c.fall)], "td");
     }
     let [t, e, both] = analysis
         .floor
@@ -134,6 +137,19 @@ fn of_components(analysis: &Analysis, faster: &str) -> String {
         let (error, time, ratio) = (short(l.error), seconds(l), ratio(l));
         let cells = [r.layer.into(), r.method.into(), error, time, ratio];
         out += &row(cells, "td");
+    }
+    out + "</table>\n"
+}
+
+fn of_presets(analysis: &Analysis) -> String {
+    let Some(reason) = presets::reason(analysis) else {
+        return String::new();
+    };
+    let reason = escape(&reason.replace('`', ""));
+    let mut out = format!("<h2>Presets</h2>\n<p>{reason}</p>\n<table class=\"presets\">\n");
+    out += &head(&presets::COLUMNS);
+    for p in &analysis.presets {
+        out += &row(p.cells(), "td");
     }
     out + "</table>\n"
 }

@@ -1,6 +1,6 @@
 //! The plots of a study.
 
-use super::{Analysis, Clock, Curve, Point};
+use super::{Analysis, Clock, Point};
 use crate::report::statistics::Interval;
 use crate::report::svg::{Plot, Series};
 
@@ -48,16 +48,66 @@ pub fn overview(analysis: &Analysis, clock: Clock, title: &str) -> Plot {
         LARGE,
         &[("", false, &error)],
     );
-    // Presets stand where the first method with photons has their samples.
-    let ladder = |c: &&Curve| analysis.curve(&c.method).any(|p| p.photons.is_some());
-    if let Some(c) = analysis.curves.iter().find(ladder) {
+    // Presets are points of the curves, or lie beyond their ends.
+    for (colour, c) in analysis.curves.iter().enumerate() {
         let preset = |p: &Point| p.preset.unwrap_or_default().to_string();
         let labels = analysis.curve(&c.method).map(preset).collect();
         if let Some(s) = plot.series.iter_mut().find(|s| s.name == c.method) {
             s.labels = labels;
         }
+        let own = |p: &&Point| p.preset.is_some() && p.rung.is_none() && p.name == c.method;
+        let beyond = analysis.points.iter().filter(own).map(|p| Series {
+            name: String::new(),
+            colour,
+            dashed: true,
+            points: analysis
+                .curve(&c.method)
+                .last()
+                .into_iter()
+                .chain([p])
+                .map(|p| (p.seconds, p.error()))
+                .collect(),
+            labels: vec![String::new(), preset(p)],
+        });
+        plot.series.extend(beyond.collect::<Vec<_>>());
     }
     plot
+}
+
+/// How the error falls with the samples, and by which power.
+pub(super) fn convergence(analysis: &Analysis) -> Plot {
+    let series = analysis
+        .curves
+        .iter()
+        .enumerate()
+        .map(|(colour, c)| Series {
+            name: match &c.fall {
+                Some(slope) => format!("{}: slope {:.2}", c.method, slope.value),
+                None => c.method.clone(),
+            },
+            colour,
+            dashed: false,
+            points: analysis
+                .curve(&c.method)
+                .map(|p| {
+                    let spp = f64::from(p.spp);
+                    let exactly = Interval {
+                        value: spp,
+                        low: spp,
+                        high: spp,
+                    };
+                    (exactly, p.error())
+                })
+                .collect(),
+            labels: Vec::new(),
+        });
+    Plot {
+        title: "Error against samples".into(),
+        x: "samples per pixel".into(),
+        y: "relMSE".into(),
+        series: series.collect(),
+        size: SMALL,
+    }
 }
 
 /// FLIP against time; `None` if this build knows no FLIP.

@@ -45,13 +45,28 @@ pub(super) fn read(path: &Path, width: u32, height: u32) -> Result<Reference> {
             "give the size of the reference with --size",
         ));
     }
-    let error = vec![0.0; layers.pixels.len()];
+    let mut error = vec![0.0; layers.pixels.len()];
+    let own = image.rgb("error").map(|half| own_error(&layers, &half));
+    error[0] = own.unwrap_or(0.0);
+    let told = match own {
+        Some(e) => format!("its own relMSE is {e:.1e}"),
+        None => "its own error is not known".into(),
+    };
     Ok(Reference {
         layers,
         error,
-        origin: format!("{}; its own error is not known", path.display()),
+        origin: format!("{}; {told}", path.display()),
         good: true,
     })
+}
+
+/// Half the width of a 90 % interval over the deviation, of many passes.
+const HALF_WIDTH: f64 = 1.645;
+
+/// The relative mean squared error that a picture in passes tells of itself, by its layer `error`.
+fn own_error(layers: &Layers, half_widths: &[[f32; 3]]) -> f64 {
+    let variance = |i: usize, c: usize| (f64::from(half_widths[i][c]) / HALF_WIDTH).powi(2);
+    Scale::new(layers.beauty()).mean(variance)
 }
 
 /// How a reference is computed: by `path`, but for what no path from the camera finds.
@@ -130,6 +145,55 @@ pub(super) fn compute(
                 error,
                 good,
             }));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::Control;
+    use crate::import::{self, ImportOptions};
+    use crate::output::{Metadata, OutputSettings};
+    use crate::pipeline::{self, Progressive};
+    use crate::plugins::Registry;
+
+    #[test]
+    fn a_reference_in_passes_tells_its_own_error() {
+        let registry = Registry::builtin();
+        let options = ImportOptions::default();
+        let file = Path::new("scenes/box.gltf");
+        let scene = import::load(file, &options, registry.scene.clone()).unwrap();
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("reference.exr");
+        for progressive in [None, Some(Progressive::default())] {
+            let settings = RenderSettings {
+                integrator: Some("path".into()),
+                width: 12,
+                height: 10,
+                spp: 400,
+                progressive,
+                ..Default::default()
+            };
+            let control = Control::default();
+            let film = pipeline::render(&scene, &settings, &registry, &control);
+            let film = film.unwrap().film;
+            let (settings, metadata) = (OutputSettings::default(), Metadata::default());
+            output::write(
+                &registry.outputs,
+                &film.develop(),
+                &settings,
+                &metadata,
+                &path,
+            )
+            .unwrap();
+            let own = read(&path, 12, 10).unwrap().error[0];
+            match film.estimated_error() {
+                // Of as many passes, the interval is not much wider than that of a normal
+                // distribution; neighbours share their relative variances.
+                Some(e) => assert!((0.5..2.0).contains(&(own / e)), "{own} {e}"),
+                None => assert_eq!(own, 0.0),
+            }
         }
     }
 }

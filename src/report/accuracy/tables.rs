@@ -5,6 +5,7 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use super::curves::{Row, components, whole};
+use super::presets::{self, COLUMNS, Standing};
 use super::{Analysis, Circumstances, Effect, Level, Study};
 use crate::report::statistics::Interval;
 
@@ -138,6 +139,12 @@ pub fn markdown(analysis: &Analysis) -> String {
         let cells = [r.layer, &short(l.error), r.method, &seconds(l), &ratio(l)];
         out += &line(cells);
     }
+    if let Some(reason) = presets::reason(analysis) {
+        out += &format!("\n{reason}\n\n{}{}", line(COLUMNS), line(["---"; 6]));
+        let cells = analysis.presets.iter().map(Standing::cells);
+        let lines = cells.map(|c| line(c.each_ref().map(String::as_str)));
+        out.extend(lines);
+    }
     let Some(base) = analysis
         .base
         .as_ref()
@@ -258,6 +265,7 @@ pub fn json(study: &Study, analysis: &Analysis, circumstances: &Circumstances) -
         "curves": analysis.curves,
         "changes": analysis.effects,
         "changes_are_made_to": analysis.base,
+        "presets": analysis.presets,
     })
 }
 
