@@ -3,30 +3,33 @@
 mod clock;
 mod foreseen;
 mod photon_file;
+mod pilot;
 mod prepared;
 mod progressive;
 mod quality;
+mod view;
 
 pub use photon_file::{PhotonFile, load_photons, save_photons};
 pub use prepared::{Prepared, prepare};
 pub use progressive::{Progressive, Session, Standing};
 pub use quality::{Quality, sampling_for, settings_for};
+pub use view::{AUTO_CAMERA, choose_camera};
 
 use std::sync::Arc;
 
 use clock::Clock;
 use foreseen::{hindrance, plan_layer};
 use progressive::Forecast;
+use view::region;
 
 use crate::accel::{Accelerator, Guarded};
-use crate::cameras::{framing, with_lens};
 use crate::control::{Control, Stopped};
 use crate::effects::{self, Decision, EffectSet};
 use crate::error::{Error, Result};
 use crate::film::{Component, Film};
 use crate::integrators::{
-    IntegratorSettings, PhotonNeeds, PixelPlan, Region, RenderContext, Spacing, Visibility,
-    camera_pass, enclosed, keeps, none_meets_another, planned_camera_pass, sights,
+    IntegratorSettings, PhotonNeeds, PixelPlan, RenderContext, Spacing, Visibility, camera_pass,
+    enclosed, keeps, planned_camera_pass, sights,
 };
 use crate::photons::{
     Guidance, GuideBy, PhotonKey, PhotonMaps, PhotonPass, PhotonSettings, SAMPLES_PER_PASS,
@@ -213,13 +216,18 @@ fn render_in_pool(
         None => settings.spp,
     };
     let spacing = Spacing::new(settings.width, settings.height, spacing_spp);
-    let passed_on = effects.found(EffectSet::CAUSTICS | EffectSet::INDIRECT);
     // Photons that are kept in a file must not depend on the camera.
-    if !passed_on.is_empty() && session.photons.is_none() {
-        if let Some(n) = none_meets_another(scene, &*accel, &*camera, &spacing, options.seed) {
-            let reason = format!("no surface in sight faces another: of {n} rays none met one");
-            effects.leave_out(&registry.effects, passed_on, &reason);
-        }
+    if session.photons.is_none() {
+        let seed = options.seed;
+        pilot::bound(
+            &mut effects,
+            scene,
+            &*accel,
+            &*camera,
+            &spacing,
+            seed,
+            registry,
+        );
         clock.lap("pilot");
     }
 
@@ -448,62 +456,4 @@ fn render_in_pool(
 fn components(set: EffectSet) -> Vec<Component> {
     let kept = |c: &Component| keeps(set, *c);
     Component::ALL.into_iter().filter(kept).collect()
-}
-
-/// The name by which a camera is asked for that frames the whole scene.
-pub const AUTO_CAMERA: &str = "auto";
-
-/// The camera that the settings name, or the first of the scene; one that frames the whole scene
-/// where there is none.
-///
-/// # Errors
-/// A name that no camera has, a camera that cannot be.
-pub fn choose_camera(
-    scene: &Scene,
-    settings: &RenderSettings,
-    registry: &Registry,
-) -> Result<Box<dyn crate::cameras::Camera>> {
-    let aspect = f64::from(settings.width) / f64::from(settings.height);
-    let desc = match &settings.camera {
-        None => scene.cameras.first(),
-        Some(name) => {
-            let named = scene.cameras.iter().find(|c| c.name == *name);
-            if named.is_none() && name != AUTO_CAMERA {
-                let names = scene.cameras.iter().map(|c| c.name.as_str());
-                return Err(Error::UnknownPlugin {
-                    kind: "camera",
-                    name: name.clone(),
-                    known: names.chain([AUTO_CAMERA]).collect::<Vec<_>>().join(", "),
-                });
-            }
-            named
-        }
-    };
-    let framed;
-    let desc = if let Some(desc) = desc {
-        desc
-    } else {
-        framed = framing(&scene.bounds.bounding_sphere(), aspect);
-        &framed
-    };
-    let entry = registry.cameras.find(desc.kind)?;
-    (entry.build)(desc, aspect)
-        .and_then(|camera| with_lens(camera, desc))
-        .map_err(|e| Error::Usage(format!("camera '{}': {e}", desc.name)))
-}
-
-fn region(settings: &RenderSettings) -> Result<Region> {
-    let (w, h) = (settings.width, settings.height);
-    if w == 0 || h == 0 || settings.spp == 0 {
-        return Err(Error::Usage(
-            "an image needs at least one pixel and one sample".into(),
-        ));
-    }
-    let [x0, y0, x1, y1] = settings.crop.unwrap_or([0, 0, w, h]);
-    if x0 >= x1 || y0 >= y1 || x1 > w || y1 > h {
-        return Err(Error::Usage(format!(
-            "crop {x0},{y0},{x1},{y1} is not a rectangle within 0,0,{w},{h}"
-        )));
-    }
-    Ok(Region { x0, y0, x1, y1 })
 }

@@ -56,7 +56,7 @@ fn a_lone_convex_body_has_no_indirect_light_and_pays_for_none() {
             let [few, many] = [&found, &forced].map(|r| r.statistics.rays);
             assert_eq!((few.gather, few.photon), (0, 0));
             // Rays that may meet a lamp are traced for the sake of direct light.
-            assert!(few.bounce as f64 <= met * many.bounce as f64);
+            assert!(few.bounce as f64 <= met * many.bounce as f64, "{few:?} {many:?}");
 
             let [found, forced] = [found, forced].map(|r| r.film.develop());
             assert_eq!(mean(&forced, "indirect"), 0.0);

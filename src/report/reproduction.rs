@@ -8,7 +8,7 @@ use super::photon_view::View;
 use crate::control::Control;
 use crate::error::Result;
 use crate::film::Image;
-use crate::photons::PhotonSettings;
+use crate::photons::{Guidance, GuideBy, PhotonSettings};
 use crate::pipeline::{self, PixelSampling, RenderSettings};
 use crate::plugins::Registry;
 use crate::sampling::hash2;
@@ -97,6 +97,8 @@ impl Contestant {
         out.pixel_sampling = self.pixels;
         out.integrator_settings.photons = self.photons[0];
         out.integrator_settings.caustic_photons = self.photons[1];
+        // The paper's emission is shared by derivatives alone.
+        out.integrator_settings.guide = GuideBy::Off;
         out
     }
 }
@@ -184,7 +186,7 @@ fn photons(
         nearest: options.nearest,
         max_depth: options.max_depth,
         roulette: options.roulette,
-        guidance: crate::photons::Guidance::Off,
+        guidance: Guidance::Off,
     };
     pipeline::in_pool(settings.threads, || {
         scene.geometry.prepare();
