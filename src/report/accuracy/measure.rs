@@ -194,7 +194,7 @@ pub(super) fn plan(
         let settings = (0..=most).map(|r| methods[method].settings(base, r));
         let fits = |s: &RenderSettings| paces[method].seconds(s.spp) <= seconds;
         let coarsest = || methods[method].settings(base, 0);
-        settings.filter(fits).last().unwrap_or_else(coarsest)
+        settings.rev().find(fits).unwrap_or_else(coarsest)
     };
     if !methods.is_empty() {
         let settings = within(0, MOST_RUNGS - 1, share / 4.0);
