@@ -42,7 +42,7 @@ fn is_on(rendering: &Rendering, name: &str) -> bool {
 
 #[test]
 fn a_lone_convex_body_has_no_indirect_light_and_pays_for_none() {
-    for (scene, met) in [(ball(|_| {}), 0.0), (ball(panel), 1.0)] {
+    for scene in [ball(|_| {}), ball(panel)] {
         for mode in [PATH, GATHER] {
             let found = rendering(&scene, &settings(mode, SIZE, 1));
             assert!(!is_on(&found, "indirect") && !is_on(&found, "caustics"));
@@ -56,7 +56,7 @@ fn a_lone_convex_body_has_no_indirect_light_and_pays_for_none() {
             let [few, many] = [&found, &forced].map(|r| r.statistics.rays);
             assert_eq!((few.gather, few.photon), (0, 0));
             // Rays that may meet a lamp are traced for the sake of direct light.
-            assert!(few.bounce as f64 <= met * many.bounce as f64, "{few:?} {many:?}");
+            assert!(few.bounce <= many.bounce, "{few:?} {many:?}");
 
             let [found, forced] = [found, forced].map(|r| r.film.develop());
             assert_eq!(mean(&forced, "indirect"), 0.0);

@@ -372,7 +372,11 @@ mod tests {
             ..RenderSettings::default()
         };
         assert_eq!(p.settings, expected);
-        let defaults = IntegratorSettings::default();
+        // The command line knows that a still picture has one camera.
+        let defaults = IntegratorSettings {
+            guide: GuideBy::View,
+            ..IntegratorSettings::default()
+        };
         assert_eq!(integrator_settings(&p.args, SQUARE), defaults);
     }
 
