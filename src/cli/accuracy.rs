@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::import;
 use crate::integrators::with_photons;
 use crate::output;
+use crate::photons::GuideBy;
 use crate::pipeline::{Quality, RenderSettings};
 use crate::plugins::Registry;
 use crate::report::accuracy::{
@@ -187,6 +188,8 @@ fn base(args: &AccuracyArgs, scene: &Scene) -> RenderSettings {
         ..Default::default()
     };
     base.integrator_settings.seed = args.seed;
+    // As `render` has still pictures guided.
+    base.integrator_settings.guide = GuideBy::View;
     base
 }
 

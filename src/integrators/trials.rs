@@ -6,13 +6,17 @@ use super::Spacing;
 use crate::accel::Accelerator;
 use crate::cameras::Camera;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::materials::{LobeClass, TransportMode};
+use crate::materials::{Bsdf, LobeClass, TransportMode};
 use crate::math::Frame;
 use crate::sampling::{Sampler, stream, warp};
 use crate::scene::Scene;
 
 /// Points of the image through which trials start, along each edge.
 const VIEWS: u32 = 48;
+
+/// Who draws numbers of [`stream::TRIALS`] beside [`walk`].
+pub(super) const SIGHTS: u64 = 1;
+const PILOT: u64 = 2;
 
 /// Surfaces of a trial: the one seen, and those that diffuse bounces reach from there.
 const BOUNCES: u32 = 3;
@@ -81,6 +85,44 @@ pub fn enclosed(
     f64::from(left) <= LEAVING * f64::from(rays)
 }
 
+/// Follows a path from the camera from surface to surface as their BSDFs lead it, and tells `met` of
+/// each, with the diffuse bounces before. It ends where it leaves the scene or is absorbed, with the
+/// second diffuse bounce, or after so many surfaces: whether it was led on for so long.
+pub(super) fn follow(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    mut ray: Ray,
+    sampler: &mut Sampler,
+    surfaces: u32,
+    mut met: impl FnMut(&SurfacePoint, &Bsdf, u32),
+) -> bool {
+    let mut inside = scene.enclosing(ray.origin());
+    let mut bounces = 0;
+    for _ in 0..surfaces {
+        let Some(hit) = accel.intersect(&ray) else {
+            return false;
+        };
+        let sp = scene.surface_point(&ray, &hit);
+        let crossing = scene.crossing(inside, &sp);
+        let mut bsdf = scene.bsdf(&sp, None, TransportMode::Radiance);
+        crossing.apply(&mut bsdf);
+        met(&sp, &bsdf, bounces);
+        let u = sampler.next_2d();
+        let Some(s) = bsdf.sample(sampler.next_1d(), u) else {
+            return false;
+        };
+        if s.class == LobeClass::Diffuse {
+            if bounces > 0 {
+                return false;
+            }
+            bounces += 1;
+        }
+        ray = sp.spawn(s.wi);
+        inside = crossing.beyond(s.transmitted);
+    }
+    true
+}
+
 /// Paths of a search for light that surfaces pass on. If none of so many finds a way for it, less
 /// than 3 in 131 072 do, by 95 %.
 const PATHS: u64 = 1 << 17;
@@ -90,7 +132,7 @@ const PATHS: u64 = 1 << 17;
 const FIRST_PATHS: u64 = 64;
 
 /// Surfaces that such a path may be led on by before it counts as found.
-const LED_ON: usize = 16;
+const LED_ON: u32 = 16;
 
 /// Whether there is no light to be seen that one surface passes to another: follows paths from all
 /// over the image until a diffuse bounce meets a surface that scatters; their number if none does. Where
@@ -104,10 +146,16 @@ pub fn none_meets_another(
 ) -> Option<u64> {
     let [w, h] = spacing.image;
     let found = |index: u64| {
-        let mut sampler = Sampler::new(seed, stream::TRIALS, 1, index);
+        let mut sampler = Sampler::new(seed, stream::TRIALS, PILOT, index);
         let ([x, y], lens) = (sampler.next_2d(), sampler.next_2d());
-        let camera_ray = spacing.camera_ray(camera, x * w, y * h, lens, false);
-        meets_another(scene, accel, camera_ray.ray, &mut sampler)
+        let ray = spacing.camera_ray(camera, x * w, y * h, lens, false).ray;
+        let mut found = false;
+        let led_on = follow(scene, accel, ray, &mut sampler, LED_ON, |sp, _, bounces| {
+            let traits = scene.material(sp.material).traits();
+            let scatters = traits.diffuse > 0.0 || traits.reflects || traits.transmits;
+            found |= bounces > 0 && scatters;
+        });
+        found || led_on
     };
     let (mut from, mut to) = (0, FIRST_PATHS);
     while from < PATHS {
@@ -121,32 +169,4 @@ pub fn none_meets_another(
         (from, to) = (to, (4 * to).min(PATHS));
     }
     Some(PATHS)
-}
-
-/// Whether a diffuse bounce from what a path sees first, maybe by way of mirrors and glass, meets a
-/// surface that scatters.
-fn meets_another(
-    scene: &Scene,
-    accel: &dyn Accelerator,
-    mut ray: Ray,
-    sampler: &mut Sampler,
-) -> bool {
-    let mut bounced = false;
-    for _ in 0..LED_ON {
-        let Some(hit) = accel.intersect(&ray) else {
-            return false;
-        };
-        let sp = scene.surface_point(&ray, &hit);
-        let traits = scene.material(sp.material).traits();
-        if bounced && (traits.diffuse > 0.0 || traits.reflects || traits.transmits) {
-            return true;
-        }
-        let bsdf = scene.bsdf(&sp, None, TransportMode::Radiance);
-        let Some(sample) = bsdf.sample(sampler.next_1d(), sampler.next_2d()) else {
-            return false;
-        };
-        bounced = sample.class == LobeClass::Diffuse;
-        ray = sp.spawn(sample.wi);
-    }
-    true
 }

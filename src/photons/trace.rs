@@ -128,27 +128,15 @@ pub(super) struct Outcome<'a> {
 
 /// Follows the photons of a source and stores none: what `tell` has to say of the outcome of each, in
 /// their order, and the rays traced. There is no outcome of what did not leave.
-#[expect(clippy::too_many_arguments, reason = "plain input, each used once")]
 pub(super) fn outcomes<T: Copy + Send>(
-    scene: &Scene,
-    accel: &dyn Accelerator,
+    tracer: &Tracer<'_>,
     source: &dyn PhotonSource,
-    purpose: Purpose,
-    effects: EffectSet,
-    settings: &PhotonSettings,
     tell: impl Fn(u64, Option<Outcome<'_>>, &mut Nearest) -> T + Sync,
     control: &Control,
 ) -> (Vec<T>, RayCounts) {
     let n = source.len();
-    let (name, part, _) = names(purpose);
+    let (name, part, _) = names(tracer.purpose);
     let stage = control.stage(name, "lessons", n);
-    let tracer = Tracer {
-        scene,
-        accel,
-        purpose,
-        effects,
-        settings,
-    };
     let (mut told, mut rays) = (Vec::new(), RayCounts::default());
     let follow = |b: u64| {
         let (mut batch, mut found) = (Batch::default(), Nearest::new());
@@ -196,12 +184,13 @@ struct Flight {
 /// photon of one channel stays one.
 type Parted = ArrayVec<Flight, 2>;
 
-struct Tracer<'a> {
-    scene: &'a Scene,
-    accel: &'a dyn Accelerator,
-    purpose: Purpose,
-    effects: EffectSet,
-    settings: &'a PhotonSettings,
+/// What photons are followed by.
+pub(super) struct Tracer<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) accel: &'a dyn Accelerator,
+    pub(super) purpose: Purpose,
+    pub(super) effects: EffectSet,
+    pub(super) settings: &'a PhotonSettings,
 }
 
 impl Tracer<'_> {

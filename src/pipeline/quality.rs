@@ -50,6 +50,7 @@ impl Quality {
             pixel_sampling: sampling_for(integrator),
             integrator_settings: IntegratorSettings {
                 seed: base.integrator_settings.seed,
+                guide: base.integrator_settings.guide,
                 ..settings_for(self.spp(), pixels)
             },
             ..base.clone()

@@ -8,14 +8,14 @@ use std::ops::Deref;
 
 use bytemuck::Pod;
 
-/// Arrays below this stay where they are: large pages would be mostly empty.
+/// Bytes below which large pages would be mostly empty.
 #[cfg(unix)]
 const LARGE: usize = 4 << 20;
 
-/// An array that is read only, of large pages where it is large.
+/// An array that is read only, on large pages where it is large.
 #[derive(Debug)]
 pub(super) enum Table<T> {
-    /// As it came.
+    /// Where the allocator puts it.
     Small(Vec<T>),
     /// Mapped, and its length.
     #[cfg(unix)]

@@ -7,7 +7,7 @@ use crate::effects::EffectSet;
 use crate::geometry::LightId;
 use crate::photons::departure::leave;
 use crate::photons::map::Nearest;
-use crate::photons::trace::{Outcome, outcomes};
+use crate::photons::trace::{Outcome, Tracer, outcomes};
 use crate::photons::uniform::{apportion, fluxes};
 use crate::photons::{EmittedPhoton, PhotonSettings, PhotonSource, Purpose, Targets};
 use crate::sampling::{Sampler, hash2, stream};
@@ -122,16 +122,14 @@ impl Teacher<'_> {
             });
             (light, Lesson { u, power, worth })
         };
-        let (learnt, rays) = outcomes(
-            self.scene,
-            self.accel,
-            &lessons,
-            self.purpose,
-            self.effects,
-            &settings,
-            learn,
-            control,
-        );
+        let tracer = Tracer {
+            scene: self.scene,
+            accel: self.accel,
+            purpose: self.purpose,
+            effects: self.effects,
+            settings: &settings,
+        };
+        let (learnt, rays) = outcomes(&tracer, &lessons, learn, control);
         let sent = learnt.len() as u64;
         let mut by_light = vec![Vec::new(); fluxes.len()];
         for (light, lesson) in learnt {

@@ -38,13 +38,14 @@ pub struct Guide {
 
 impl Guide {
     /// What the lessons of each light tell; `fluxes` are those of the lights. `None` if none of the
-    /// lessons brought anything.
+    /// lessons brought anything, or powers are beyond what their squares can be told in.
     fn new(mut lessons: Vec<Vec<Lesson>>, fluxes: &[f64]) -> Option<Self> {
         let all = || lessons.iter().flatten();
         let power: f64 = all().map(|l| l.power).sum();
         let worth: f64 = all().map(|l| l.worth).sum();
         let flux: f64 = fluxes.iter().sum();
-        if !(power > 0.0 && worth > 0.0 && worth.is_finite()) {
+        let told = |x: f64| x > 0.0 && x.is_finite();
+        if !(told(power) && told(worth)) {
             return None;
         }
         let hearsay = Known {
@@ -149,5 +150,11 @@ mod tests {
             assert!(least >= UNGUIDED / (49.0 + flux));
         }
         assert!(Guide::new(vec![Vec::new(); 2], &[1.0, 0.0]).is_none());
+        let huge = Lesson {
+            u: [0.5; 2],
+            power: f64::INFINITY,
+            worth: 1.0,
+        };
+        assert!(Guide::new(vec![vec![huge]], &[1e200]).is_none());
     }
 }

@@ -2,6 +2,7 @@
 //! method or a change is one line.
 
 use crate::integrators::{IntegratorSettings, PhotonNeeds};
+use crate::photons::GuideBy;
 use crate::pipeline::{PixelSampling, RenderSettings, settings_for};
 use crate::plugins::Registry;
 
@@ -158,9 +159,10 @@ fn hybrid_ladder(s: &mut RenderSettings, rung: u32) {
 
 fn set_photons(s: &mut RenderSettings) {
     let pixels = u64::from(s.width) * u64::from(s.height);
-    let seed = s.integrator_settings.seed;
+    let IntegratorSettings { seed, guide, .. } = s.integrator_settings;
     s.integrator_settings = IntegratorSettings {
         seed,
+        guide,
         ..settings_for(s.spp, pixels)
     };
 }
@@ -203,6 +205,11 @@ pub const CHANGES: &[Change] = &[
         name: "a quarter as many in a kernel",
         doc: "kernels half as wide, twice the noise in them",
         apply: |s| s.integrator_settings.nearest = (s.integrator_settings.nearest / 4).max(2),
+    },
+    Change {
+        name: "photons unguided",
+        doc: "shared by the flux of the lamps",
+        apply: |s| s.integrator_settings.guide = GuideBy::Off,
     },
     Change {
         name: "4 times the gather rays",
