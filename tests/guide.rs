@@ -7,6 +7,7 @@ mod common;
 use std::fs;
 use std::sync::Arc;
 
+use common::render::with_photons;
 use common::stats::Samples;
 use common::{add_quad, add_room, add_sphere, glass, lambert, light, look_at};
 use dualight::accel::ACCELERATORS;
@@ -89,15 +90,7 @@ fn settings(guide: GuideBy, photons: u64, seed: u64) -> RenderSettings {
 }
 
 fn render(scene: &Scene, settings: &RenderSettings, photons: Option<PhotonFile>) -> Vec<[f32; 3]> {
-    let session = Session {
-        film: None,
-        seconds: 0.0,
-        watch: &mut |_, _| {},
-        photons,
-        prepared: None,
-    };
-    let (registry, control) = (Registry::builtin(), Control::default());
-    let done = pipeline::render_session(scene, settings, &registry, &control, session).unwrap();
+    let done = with_photons(scene, settings, photons).unwrap();
     done.film.develop().rgb("caustics").unwrap()
 }
 

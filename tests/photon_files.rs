@@ -9,16 +9,14 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use common::render::{DIRECT_MAP, GATHER, Mode, Size, settings};
+use common::render::{DIRECT_MAP, GATHER, Mode, Size, settings, with_photons as render};
 use common::{add_sphere, box_scene, camera, glass, lambert, light, square};
 use dualight::color::Rgb;
-use dualight::control::Control;
 use dualight::film::Image;
 use dualight::lights::{LightDesc, SkyImage};
 use dualight::materials::{MaterialDesc, TextureSlots};
 use dualight::math::{DAffine3, DVec3};
-use dualight::pipeline::{self, PhotonFile, RenderSettings, Rendering, Session};
-use dualight::plugins::Registry;
+use dualight::pipeline::{PhotonFile, RenderSettings, Rendering};
 use dualight::scene::{MeshPlacement, Scene, SceneBuilder};
 use dualight::textures::{Content, Texels, Texture};
 
@@ -33,23 +31,6 @@ const HYBRID: Mode = Mode {
     integrator: "hybrid",
     gather_rays: 0,
 };
-
-fn render(
-    scene: &Scene,
-    settings: &RenderSettings,
-    photons: Option<PhotonFile>,
-) -> Result<Rendering, String> {
-    let session = Session {
-        film: None,
-        seconds: 0.0,
-        watch: &mut |_, _| {},
-        photons,
-        prepared: None,
-    };
-    let (registry, control) = (Registry::builtin(), Control::default());
-    pipeline::render_session(scene, settings, &registry, &control, session)
-        .map_err(|e| e.to_string())
-}
 
 fn save(path: &Path) -> Option<PhotonFile> {
     Some(PhotonFile::Save(path.into()))

@@ -6,174 +6,20 @@ mod common;
 
 use std::sync::Arc;
 
+use common::random::{add_square, material, scene};
 use common::render::{GATHER, Mode, PATH, Size, mean, rendering, settings};
 use common::show::{self, Show};
-use common::{add_room, add_sphere, camera, glass, lambert, lamp, light, square};
-use dualight::cameras::{CameraDesc, Lens};
+use common::{add_room, add_sphere, camera, glass, lambert, light};
 use dualight::color::Rgb;
 use dualight::effects::{Acts, EFFECTS, EffectSet, omissions, survey};
-use dualight::geometry::{MaterialId, Ray, TriangleMesh};
+use dualight::geometry::Ray;
 use dualight::lights::LightDesc;
 use dualight::materials::{AlphaMode, MaterialDesc, TextureSlots, TransportMode};
-use dualight::math::{DAffine3, DVec3};
+use dualight::math::DVec3;
 use dualight::plugins::Registry;
 use dualight::sampling::Rng;
-use dualight::scene::{MeshPlacement, Omit, Scene, SceneBuilder};
-use dualight::textures::{Content, Image, Texels, Texture};
-
-/// An image of 4 × 4 texels, each channel all 0, all 255 or of both.
-fn texture(rng: &mut Rng, content: Content) -> Option<Texture> {
-    if rng.next_1d() < 0.5 {
-        return None;
-    }
-    let kinds: [u64; 4] = std::array::from_fn(|_| rng.next_u64() % 3);
-    let texels = (0..16 * 4)
-        .map(|i| match kinds[i % 4] {
-            0 => 0,
-            1 => 255,
-            _ => 255 * (rng.next_u64() % 2) as u8,
-        })
-        .collect();
-    let image = Image::from_texels(4, 4, 4, Texels::U8(texels)).unwrap();
-    Some(Texture::new(Arc::new(image), content))
-}
-
-/// A glTF material of which everything may be on or off, by factor and by texture.
-fn material(rng: &mut Rng) -> MaterialDesc {
-    let toss = |rng: &mut Rng| f64::from(u8::from(rng.next_1d() < 0.5));
-    let rarely = |rng: &mut Rng| f64::from(u8::from(rng.next_1d() < 0.25));
-    let rare = |rng: &mut Rng, content| match rng.next_1d() < 0.25 {
-        true => texture(rng, content),
-        false => None,
-    };
-    let slots = TextureSlots {
-        base_color: texture(rng, Content::Color),
-        metallic_roughness: texture(rng, Content::Data),
-        transmission: texture(rng, Content::Data),
-        specular: texture(rng, Content::Data),
-        clearcoat: texture(rng, Content::Data),
-        sheen_color: texture(rng, Content::Color),
-        normal: rare(rng, Content::Data),
-        normal_scale: toss(rng),
-        clearcoat_normal: rare(rng, Content::Data),
-        clearcoat_normal_scale: 0.5,
-        iridescence: rare(rng, Content::Data),
-        anisotropy: rare(rng, Content::Data),
-        diffuse_transmission: rare(rng, Content::Data),
-        ..Default::default()
-    };
-    MaterialDesc {
-        name: "random".into(),
-        base_color: Rgb::splat(0.8 * toss(rng)),
-        metallic: toss(rng),
-        roughness: 0.6 * toss(rng),
-        transmission: 0.7 * toss(rng),
-        volume: rng.next_1d() < 0.5,
-        specular: toss(rng),
-        clearcoat: toss(rng),
-        sheen_color: Rgb::splat(0.5 * toss(rng)),
-        attenuation_distance: if rng.next_1d() < 0.5 {
-            0.7
-        } else {
-            f64::INFINITY
-        },
-        attenuation_color: Rgb::new(1.0, 1.0 - 0.5 * toss(rng), 1.0),
-        dispersion: 3.0 * rarely(rng),
-        diffuse_transmission: 0.6 * rarely(rng),
-        iridescence: rarely(rng),
-        anisotropy: 0.8 * rarely(rng),
-        textures: Some(Arc::new(slots)),
-        ..Default::default()
-    }
-}
-
-/// A square of side 2 around `c`, with texture coordinates, that looks along `+z`.
-fn add_square(b: &mut SceneBuilder, material: MaterialId, c: DVec3) {
-    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
-    let mesh = TriangleMesh {
-        positions: corners
-            .map(|[x, y]| (c + DVec3::new(x, y, 0.0)).as_vec3().into())
-            .to_vec(),
-        indices: vec![[0, 1, 2], [0, 2, 3]],
-        uv_sets: vec![corners.map(|v| v.map(|x| x as f32)).to_vec()],
-        ..Default::default()
-    };
-    let shape = b.add_mesh(mesh, "square");
-    b.place(MeshPlacement {
-        shape,
-        material,
-        world_from_object: DAffine3::IDENTITY,
-        name: "square".into(),
-    });
-}
-
-/// Alpha, now and then: too little of it to be seen, or a half.
-fn with_alpha(rng: &mut Rng, mut d: MaterialDesc) -> MaterialDesc {
-    d.alpha_mode = match rng.next_u64() % 6 {
-        0 => AlphaMode::Blend,
-        1 => AlphaMode::Mask { cutoff: 0.5 },
-        _ => AlphaMode::Opaque,
-    };
-    d.base_alpha = if rng.next_1d() < 0.5 { 1.0 } else { 0.6 };
-    d
-}
-
-/// A room in which everything may be there or not, without what `omit` says.
-fn scene(seed: u64, omit: Omit) -> Scene {
-    let rng = &mut Rng::new(seed);
-    let mut b = SceneBuilder::default();
-    b.leave_out(omit);
-    let walls = match rng.next_u64() % 3 {
-        0 => b.add_material(&material(rng)),
-        1 => b.add_material(&lambert("black", Rgb::ZERO)),
-        _ => b.add_material(&lambert("grey", Rgb::splat(0.5))),
-    };
-    let other = material(rng);
-    let other = with_alpha(rng, other);
-    let (walls, other) = (walls.unwrap(), b.add_material(&other).unwrap());
-    if rng.next_1d() < 0.7 {
-        add_room(&mut b, walls, 3.0);
-    } else {
-        add_square(&mut b, walls, DVec3::new(0.5, 0.5, -2.0));
-    }
-    add_square(&mut b, other, DVec3::new(0.0, 0.0, -1.0));
-    if rng.next_1d() < 0.5 {
-        add_sphere(&mut b, "ball", other, DVec3::new(-0.8, -0.5, 0.0), 0.7);
-    }
-    if rng.next_1d() < 0.3 {
-        let shape = b.add_mesh(square(), "twice");
-        for x in [-1.5, 1.5] {
-            b.place(MeshPlacement {
-                shape,
-                material: other,
-                world_from_object: DAffine3::from_translation(DVec3::new(x, 0.5, -1.5)),
-                name: "twice".into(),
-            });
-        }
-    }
-    if rng.next_1d() < 0.5 {
-        b.add_light(light("point", DVec3::new(0.5, 1.0, 1.0), DVec3::Y, 3.0));
-    }
-    if rng.next_1d() < 0.5 {
-        let glowing = b.add_material(&lamp(Rgb::splat(2.0))).unwrap();
-        add_square(&mut b, glowing, DVec3::new(1.5, 1.5, -2.0));
-    }
-    if rng.next_1d() < 0.3 {
-        b.add_light(light("environment", DVec3::ZERO, DVec3::Y, 0.5));
-    }
-    let lens = (rng.next_1d() < 0.4).then_some(Lens {
-        radius: if rng.next_1d() < 0.5 { 0.1 } else { 0.0 },
-        focus: 2.0,
-        blades: 0,
-        rotation: 0.0,
-        ratio: 1.0,
-    });
-    b.add_camera(CameraDesc {
-        lens,
-        ..camera(DVec3::new(0.0, 0.0, 2.5), 60.0)
-    });
-    b.finish().unwrap()
-}
+use dualight::scene::{Omit, Scene, SceneBuilder};
+use dualight::textures::Content;
 
 /// What a material says that it may do holds wherever it is looked at.
 #[test]
@@ -212,6 +58,8 @@ fn traits_promise_all_that_a_material_does() {
     assert!(seen.iter().all(|n| *n > 500), "{seen:?}");
 }
 
+type Pixels = Vec<[f32; 3]>;
+
 /// How a picture is made, and of what size.
 const WAYS: [(Mode, Size); 2] = [
     (
@@ -232,27 +80,26 @@ const WAYS: [(Mode, Size); 2] = [
     ),
 ];
 
-fn picture(scene: &Scene, mode: Mode, size: Size, seed: u64, effects: &str) -> Vec<[f32; 3]> {
+/// What is seen, how much of it surfaces passed to one another, and whether the pilot left that out.
+fn rendered(
+    scene: &Scene,
+    mode: Mode,
+    size: Size,
+    seed: u64,
+    effects: &str,
+) -> (Pixels, f64, bool) {
     let mut s = settings(mode, size, seed);
     s.effects = effects.into();
-    let image = rendering(scene, &s).film.develop();
-    image.rgb("").unwrap().to_vec()
+    let done = rendering(scene, &s);
+    let left_out = done.effects.iter().any(|d| d.reason.contains("none met"));
+    let image = done.film.develop();
+    let layer = |name| image.rgb(name).map_or(0.0, |_| mean(&image, name));
+    let passed_on = layer("indirect") + layer("caustics");
+    (image.rgb("").unwrap(), passed_on, left_out)
 }
 
-/// Whether the pilot leaves out what surfaces pass to one another; there must be none of it then, if it
-/// is simulated all the same.
-fn without_passing_on(scene: &Scene, mode: Mode, size: Size, seed: u64) -> bool {
-    let mut s = settings(mode, size, seed);
-    let decisions = rendering(scene, &s).effects;
-    let left_out = decisions.iter().any(|d| d.reason.contains("none met"));
-    if left_out {
-        s.effects = "all".into();
-        let all = rendering(scene, &s).film.develop();
-        for layer in ["indirect", "caustics"] {
-            assert_eq!(mean(&all, layer), 0.0, "round {seed} by {}", mode.name);
-        }
-    }
-    left_out
+fn picture(scene: &Scene, mode: Mode, size: Size, seed: u64, effects: &str) -> Pixels {
+    rendered(scene, mode, size, seed, effects).0
 }
 
 /// Whatever the survey skips can be forced, or left out when the scene is built, and every bit of
@@ -277,22 +124,26 @@ fn no_scene_loses_light_to_the_survey() {
         let lean = scene(round, omissions(&rest, table).unwrap());
         for (mode, size) in WAYS {
             let what = format!("round {round} by {}", mode.name);
-            let auto = picture(&whole, mode, size, round, "auto");
+            let draw = |scene, effects| rendered(scene, mode, size, round, effects);
+            let (auto, _, left_out) = draw(&whole, "auto");
             // What was dropped would be missing.
-            let all = match without_passing_on(&whole, mode, size, round) {
-                true => "all,-indirect,-caustics",
-                false => "all",
+            let (all, passed_on, _) = draw(&whole, "all");
+            let same = match left_out {
+                false => all == auto,
+                // Without bounces other random numbers are drawn: there is nothing to be bounced to.
+                true => {
+                    assert_eq!(passed_on, 0.0, "{what}");
+                    draw(&whole, "all,-indirect,-caustics").0 == auto
+                }
             };
-            assert!(auto == picture(&whole, mode, size, round, all), "{what}");
-            let lean = picture(&lean, mode, size, round, "auto");
-            assert!(auto == lean, "{what}: {rest}");
+            assert!(same, "{what}");
+            assert!(draw(&lean, "auto").0 == auto, "{what}: {rest}");
             // And what is kept is not kept for nothing, in one scene or another: one of them is
             // left out in turn.
             if let Some(&i) = kept.iter().min_by_key(|i| needed[**i]) {
                 let wish = format!("-{}", EFFECTS[i].name);
                 let without = scene(round, omissions(&wish, table).unwrap());
-                let without = picture(&without, mode, size, round, &wish);
-                needed[i] += usize::from(without != auto);
+                needed[i] += usize::from(draw(&without, &wish).0 != auto);
             }
         }
     }

@@ -10,6 +10,7 @@ pub mod chi2;
 pub mod oracle;
 pub mod photons;
 pub mod points;
+pub mod random;
 pub mod render;
 pub mod show;
 pub mod stats;

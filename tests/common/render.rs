@@ -7,7 +7,7 @@ use dualight::control::Control;
 use dualight::film::Image;
 use dualight::geometry::Geometry;
 use dualight::integrators::IntegratorSettings;
-use dualight::pipeline::{self, PixelSampling, RenderSettings, Rendering};
+use dualight::pipeline::{self, PhotonFile, PixelSampling, RenderSettings, Rendering, Session};
 use dualight::plugins::Registry;
 use dualight::scene::Scene;
 
@@ -103,6 +103,24 @@ pub fn rendering(scene: &Scene, settings: &RenderSettings) -> Rendering {
     let rendering = result.expect("a scene made in code renders");
     assert_eq!(rendering.statistics.rejected_pixels, 0, "NaN or infinity");
     rendering
+}
+
+/// Renders with photons that a file keeps or is to keep; the error is its text.
+pub fn with_photons(
+    scene: &Scene,
+    settings: &RenderSettings,
+    photons: Option<PhotonFile>,
+) -> Result<Rendering, String> {
+    let session = Session {
+        film: None,
+        seconds: 0.0,
+        watch: &mut |_, _| {},
+        photons,
+        prepared: None,
+    };
+    let (registry, control) = (Registry::builtin(), Control::default());
+    pipeline::render_session(scene, settings, &registry, &control, session)
+        .map_err(|e| e.to_string())
 }
 
 /// As [`rendering`], developed.
