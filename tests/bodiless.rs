@@ -9,8 +9,7 @@ use std::f64::consts::PI;
 
 use common::render::{GATHER, MODES, Size, mean, render, rendering, settings};
 use common::stats::Samples;
-use common::{add_quad, camera, lambert, look_at, mirror};
-use dualight::cameras::Lens;
+use common::{add_quad, camera, lambert, look_at, mirror, round_lens};
 use dualight::color::Rgb;
 use dualight::lights::{LIGHTS, Light, LightDesc, SpotCurve};
 use dualight::math::DVec3;
@@ -266,13 +265,7 @@ fn a_lens_blurs_what_is_out_of_focus_and_nothing_else() {
         let p = DVec3::new(0.0, -5.0, 0.0);
         add_quad(&mut b, "card", m, p, DVec3::X * 5.0, DVec3::Y * 10.0);
         let mut c = camera(DVec3::Z * 4.0, 20.0);
-        c.lens = Some(Lens {
-            radius: 0.2,
-            focus,
-            blades: 0,
-            rotation: 0.0,
-            ratio: 1.0,
-        });
+        c.lens = Some(round_lens(0.2, focus));
         b.add_camera(c);
         b.finish().unwrap()
     };

@@ -15,7 +15,7 @@ pub mod render;
 pub mod show;
 pub mod stats;
 
-use dualight::cameras::CameraDesc;
+use dualight::cameras::{CameraDesc, Lens};
 use dualight::color::Rgb;
 use dualight::geometry::{MaterialId, SphereSet, TriangleMesh};
 use dualight::lights::LightDesc;
@@ -133,6 +133,17 @@ pub fn camera(eye: DVec3, yfov_degrees: f64) -> CameraDesc {
         aspect: Some(1.0),
         shift: [0.0; 2],
         lens: None,
+    }
+}
+
+/// A round opening of so many metres.
+pub fn round_lens(radius: f64, focus: f64) -> Lens {
+    Lens {
+        radius,
+        focus,
+        blades: 0,
+        rotation: 0.0,
+        ratio: 1.0,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dualight::cameras::{CameraDesc, Lens};
+use dualight::cameras::CameraDesc;
 use dualight::color::Rgb;
 use dualight::geometry::{MaterialId, TriangleMesh};
 use dualight::materials::{AlphaMode, MaterialDesc, TextureSlots};
@@ -11,7 +11,7 @@ use dualight::sampling::Rng;
 use dualight::scene::{MeshPlacement, Omit, Scene, SceneBuilder};
 use dualight::textures::{Content, Image, Texels, Texture};
 
-use super::{add_room, add_sphere, camera, lambert, lamp, light, square};
+use super::{add_room, add_sphere, camera, lambert, lamp, light, round_lens, square};
 
 /// An image of 4 × 4 texels, each channel all 0, all 255 or of both.
 fn texture(rng: &mut Rng, content: Content) -> Option<Texture> {
@@ -153,12 +153,9 @@ pub fn scene(seed: u64, omit: Omit) -> Scene {
     if rng.next_1d() < 0.3 {
         b.add_light(light("environment", DVec3::ZERO, DVec3::Y, 0.5));
     }
-    let lens = (rng.next_1d() < 0.4).then_some(Lens {
-        radius: if rng.next_1d() < 0.5 { 0.1 } else { 0.0 },
-        focus: 2.0,
-        blades: 0,
-        rotation: 0.0,
-        ratio: 1.0,
+    let lens = (rng.next_1d() < 0.4).then(|| {
+        let radius = if rng.next_1d() < 0.5 { 0.1 } else { 0.0 };
+        round_lens(radius, 2.0)
     });
     b.add_camera(CameraDesc {
         lens,

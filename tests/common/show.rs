@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dualight::cameras::{CameraDesc, Lens};
+use dualight::cameras::CameraDesc;
 use dualight::color::Rgb;
 use dualight::lights::LightDesc;
 use dualight::materials::{AlphaMode, MaterialDesc, TextureSlots};
@@ -11,7 +11,7 @@ use dualight::sampling::Rng;
 use dualight::scene::{MeshPlacement, Omit, Scene, SceneBuilder};
 use dualight::textures::{Content, Image, Texels, Texture};
 
-use super::{add_quad, add_room, add_sphere, camera, lambert, lamp, square};
+use super::{add_quad, add_room, add_sphere, camera, lambert, lamp, round_lens, square};
 
 /// What there is to see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -243,13 +243,8 @@ pub fn scene(show: Show, strength: impl Into<Option<f64>>, omit: Omit) -> Scene 
             ..Default::default()
         });
     }
-    let lens = strength.filter(|_| has(Show::Lens)).map(|x| Lens {
-        radius: 0.15 * x,
-        focus: 2.0,
-        blades: 0,
-        rotation: 0.0,
-        ratio: 1.0,
-    });
+    let lens = strength.filter(|_| has(Show::Lens));
+    let lens = lens.map(|x| round_lens(0.15 * x, 2.0));
     b.add_camera(CameraDesc {
         lens,
         ..camera(DVec3::new(0.0, 0.2, 2.8), 55.0)
