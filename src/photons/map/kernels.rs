@@ -22,6 +22,9 @@ use crate::photons::PhotonClass;
 /// Pilot photons that tell a density: enough for a radius good to a tenth.
 const PILOT_NEAREST: usize = 16;
 
+/// Where light is even by a χ² test, a kernel holds up to so many times the photons.
+const EVEN: usize = 4;
+
 /// Sites nearer to each other than this part of their radius are one.
 const THINNING: f32 = 1.0 / 64.0;
 
@@ -160,14 +163,14 @@ impl Pilot<'_> {
             .photons()
             .par_chunks(1024)
             .flat_map_iter(|chunk| {
-                let mut found = Nearest::new();
+                let (mut found, mut last2) = (Nearest::new(), f32::INFINITY);
                 let mut part: Vec<(Vec3, Decision, Seen)> = Vec::new();
                 for photon in chunk {
                     let site = Site {
                         p: Vec3::from(photon.p),
                         ng: photon.ng(),
                     };
-                    let near = map.spread(&site, photon, &mut found);
+                    let near = map.spread(&site, photon, EVEN, &mut found, &mut last2);
                     let radius = (f64::from(near) * scale) as f32;
                     let radius = radius.clamp(super::LEAST * widest, widest);
                     // Photons in one place need to be counted once only.

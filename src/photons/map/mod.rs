@@ -1,5 +1,6 @@
 //! Photon maps: photons in a tree, and what is estimated from them.
 
+mod bandwidth;
 mod clearing;
 mod ground;
 mod irradiance;
@@ -37,6 +38,9 @@ const FLATNESS: f32 = 0.25;
 /// they were spread evenly over the whole scene. Where even this finds too few, light is so
 /// weak that a fixed kernel serves.
 const REACH: f64 = 4.0;
+
+/// Squared distance that is searched first over the one at the neighbour.
+const GUESS: f32 = 2.0;
 
 /// The smallest kernel's radius over the largest. Photons in one place would have no density.
 const LEAST: f32 = 1e-4;
@@ -160,16 +164,53 @@ impl PhotonMap {
         self.kernels.as_ref()
     }
 
-    /// Distance to the farthest of the wanted number of photons around a site, or as far as is
-    /// searched. Those that have no channel in common with `like` are others.
-    fn spread(&self, site: &Site, like: &Photon, found: &mut Nearest) -> f32 {
-        found.reset(self.nearest, self.max_radius * self.max_radius);
+    /// Distance to the farthest of the wanted number of photons around a site, of up to `times` as many
+    /// where they lie evenly, or as far as is searched. Those that have no channel in common with `like`
+    /// are others. `last2` is from call to call the squared distance that was last searched up to, which
+    /// makes searches short where sites follow their neighbours.
+    fn spread(
+        &self,
+        site: &Site,
+        like: &Photon,
+        times: usize,
+        found: &mut Nearest,
+        last2: &mut f32,
+    ) -> f32 {
         let side = Side::new(site);
-        self.tree.visit_near(site.p, found, |i, p, r2| {
-            let photon = &self.photons[i];
-            photon.shares_channel(like) && side.accepts(p, photon.packed_ng(), r2)
-        });
-        found.kernel().1.sqrt()
+        let search = |found: &mut Nearest, k: usize, max2: f32| {
+            found.reset(k, max2);
+            self.tree.visit_near(site.p, found, |i, p, r2| {
+                let photon = &self.photons[i];
+                photon.shares_channel(like) && side.accepts(p, photon.packed_ng(), r2)
+            });
+        };
+        let (max2, most) = (self.max_radius * self.max_radius, times * self.nearest);
+        let mut k = (2 * self.nearest).min(most);
+        search(found, k, max2.min(GUESS * *last2));
+        if !found.kernel().0 {
+            search(found, k, max2);
+        }
+        *last2 = found.kernel().1;
+        let Some(mut widest2) = found.nth(self.nearest) else {
+            return self.max_radius;
+        };
+        let frame = site.ng.any_orthonormal_pair().into();
+        while k > self.nearest {
+            let (enough, rim) = found.kernel();
+            let even = enough
+                && rim <= bandwidth::FARTHEST * widest2
+                && bandwidth::is_even(&self.photons, found, rim, site.p, frame);
+            if !even {
+                break;
+            }
+            widest2 = rim;
+            if 2 * k > most {
+                break;
+            }
+            k *= 2;
+            search(found, k, (bandwidth::FARTHEST * widest2).min(max2));
+        }
+        widest2.sqrt()
     }
 
     /// Number of photons.

@@ -55,6 +55,16 @@ impl Nearest {
         (self.full, self.max2)
     }
 
+    /// Squared distance of the `k`-th nearest of what was found, counted from 1; the end of a search,
+    /// since it leaves the items in another order.
+    pub(super) fn nth(&mut self, k: usize) -> Option<f32> {
+        if k == 0 || k > self.heap.len() {
+            return None;
+        }
+        let (_, nth, _) = (self.heap).select_nth_unstable_by(k - 1, |a, b| a.0.total_cmp(&b.0));
+        Some(nth.0)
+    }
+
     /// Items found.
     #[inline]
     pub fn len(&self) -> usize {
