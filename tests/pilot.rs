@@ -42,7 +42,7 @@ fn is_on(rendering: &Rendering, name: &str) -> bool {
 
 #[test]
 fn a_lone_convex_body_has_no_indirect_light_and_pays_for_none() {
-    for scene in [ball(|_| {}), ball(panel)] {
+    for (scene, has_panel) in [(ball(|_| {}), false), (ball(panel), true)] {
         for mode in [PATH, GATHER] {
             let found = rendering(&scene, &settings(mode, SIZE, 1));
             assert!(!is_on(&found, "indirect") && !is_on(&found, "caustics"));
@@ -55,8 +55,13 @@ fn a_lone_convex_body_has_no_indirect_light_and_pays_for_none() {
             assert!(is_on(&forced, "indirect"));
             let [few, many] = [&found, &forced].map(|r| r.statistics.rays);
             assert_eq!((few.gather, few.photon), (0, 0));
-            // Rays that may meet a lamp are traced for the sake of direct light.
+            // Only rays that may meet a lamp are traced for the sake of direct light.
             assert!(few.bounce <= many.bounce, "{few:?} {many:?}");
+            assert_eq!(
+                few.bounce > 0,
+                has_panel && mode.name == PATH.name,
+                "{few:?}"
+            );
 
             let [found, forced] = [found, forced].map(|r| r.film.develop());
             assert_eq!(mean(&forced, "indirect"), 0.0);

@@ -51,6 +51,15 @@ enum Walk {
     Indirect,
 }
 
+/// All of them, in the order of their numbers.
+const WALKS: [Walk; 5] = [
+    Walk::Camera,
+    Walk::Specular,
+    Walk::Diffuse,
+    Walk::DiffuseSpecular,
+    Walk::Indirect,
+];
+
 impl Walk {
     /// After one more scattering event.
     #[inline]
@@ -93,6 +102,8 @@ pub(super) struct Path<'a, const PHOTONS: bool> {
     cx: RenderContext<'a>,
     /// What segments are traced for after a diffuse surface, by the [`Walk`] so far.
     beyond: [Part; 5],
+    /// Whether anything can be found beyond a surface, by the [`Walk`] so far with it.
+    onward: [bool; 5],
 }
 
 impl<'a, const PHOTONS: bool> Path<'a, PHOTONS> {
@@ -111,7 +122,11 @@ impl<'a, const PHOTONS: bool> Path<'a, PHOTONS> {
         ] {
             beyond[walk as usize] = part;
         }
-        Self { cx, beyond }
+        // Without light to pass on, only a lamp that can be met is worth one more segment.
+        let lamps = cx.scene.lights.iter().any(|l| !l.is_delta());
+        let onward = WALKS
+            .map(|walk| walk.goes_on(cx.effects) || lamps && keeps(cx.effects, walk.component()));
+        Self { cx, beyond, onward }
     }
 }
 
@@ -366,7 +381,7 @@ impl<const PHOTONS: bool> Path<'_, PHOTONS> {
         };
         w.beta *= s.weight;
         let walk = w.walk.after(s.class);
-        if !walk.goes_on(cx.effects) && !keeps(cx.effects, walk.component()) {
+        if !self.onward[walk as usize] {
             return false;
         }
         w.part = match walk {
