@@ -36,7 +36,7 @@ impl fmt::Debug for Filter {
 #[repr(C, align(16))]
 pub(super) struct Context {
     base: [u8; 64],
-    key: u64,
+    pub(super) key: u64,
 }
 
 const _: () = {
@@ -91,7 +91,7 @@ pub(super) fn install(geometry: RTCGeometry, filter: &Arc<Filter>) {
 
 /// Called by Embree for a hit of a geometry with a filter.
 // SAFETY: only Embree calls it, with arguments that it made.
-unsafe extern "C" fn on_hit(args: *const RTCFilterFunctionNArguments) {
+pub(super) unsafe extern "C" fn on_hit(args: *const RTCFilterFunctionNArguments) {
     // SAFETY: Embree passes a pointer to arguments that live during the call.
     let args = unsafe { &*args };
     if args.N != 1 {

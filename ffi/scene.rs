@@ -338,7 +338,7 @@ impl CommittedScene {
 
 /// What a query found.
 #[inline]
-fn raw_hit(RayHit { ray, hit }: &RayHit) -> Option<RawHit> {
+pub(super) fn raw_hit(RayHit { ray, hit }: &RayHit) -> Option<RawHit> {
     // The library has just written single numbers here. A compiler that loads a vector which holds
     // one of them makes the processor wait until all of it is in the cache; told not to touch the
     // load, it loads what was written.
@@ -356,7 +356,7 @@ fn raw_hit(RayHit { ray, hit }: &RayHit) -> Option<RawHit> {
 
 /// Whether Embree may see this ray.
 #[inline]
-fn is_ray(org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> bool {
+pub(super) fn is_ray(org: [f32; 3], dir: [f32; 3], tnear: f32, tfar: f32) -> bool {
     // A sum of sizes is only finite if all of them are; if it is not, it may have overflowed.
     let length = dir[0].abs() + dir[1].abs() + dir[2].abs();
     let sum = length + (org[0].abs() + org[1].abs() + org[2].abs());

@@ -1,5 +1,6 @@
 //! What the rest of the crate relies on, asked of the real library.
 
+mod by_hand;
 mod filter;
 
 use std::ptr;

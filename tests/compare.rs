@@ -15,13 +15,14 @@ use dualight::cameras::CAMERAS;
 use dualight::color::Rgb;
 use dualight::control::Control;
 use dualight::geometry::{
-    Geometry, Hit, MaterialId, Object, ObjectId, Ray, Shape, ShapeId, TriangleMesh,
+    Geometry, Hit, MaterialId, Object, ObjectId, Ray, Shape, ShapeId, SphereSet, TriangleMesh,
 };
 use dualight::materials::{AlphaMode, MaterialDesc};
 use dualight::math::{DAffine3, DQuat, DVec3};
 use dualight::photons::{EMISSIONS, EmissionContext, Purpose};
 use dualight::report::agreement::{self, Agreement};
 use dualight::report::rays::{RayKind, RayMaker};
+use dualight::sampling::Rng;
 use dualight::scene::{MeshPlacement, Scene, SceneBuilder};
 
 fn build(name: &str, geometry: &Arc<Geometry>) -> Box<dyn Accelerator> {
@@ -122,6 +123,54 @@ fn the_box_and_a_fine_mesh_have_no_unexplained_difference() {
         &[DAffine3::IDENTITY],
     );
     agree("sheet", &scene, 100_000);
+}
+
+#[test]
+fn the_size_of_a_scene_is_no_difference() {
+    for exponent in [-56, -43, 43, 53, 59] {
+        let unit = 2f64.powi(exponent);
+        let mut b = SceneBuilder::default();
+        let m = b.add_material(&lambert("grey", Rgb::splat(0.5))).unwrap();
+        let sheet = b.add_mesh(sheet(20), "sheet");
+        let mut rng = Rng::new(1);
+        let spheres: Vec<[f32; 4]> = (0..100)
+            .map(|_| [(); 3].map(|()| (rng.next_1d() - 0.5) as f32))
+            .map(|[x, y, z]| [x, y, z, 0.03])
+            .collect();
+        let balls = b.add_spheres(SphereSet { spheres }, "balls");
+        // Instances, for each stands twice.
+        for (shape, offset, scale) in [
+            (sheet, DVec3::ZERO, DVec3::ONE),
+            (sheet, DVec3::Z * -0.3, DVec3::splat(0.5)),
+            (balls, DVec3::ZERO, DVec3::ONE),
+            (balls, DVec3::X * 0.3, DVec3::new(0.5, 0.4, 1.0)),
+        ] {
+            b.place(MeshPlacement {
+                shape,
+                material: m,
+                world_from_object: DAffine3::from_scale_rotation_translation(
+                    scale * unit,
+                    DQuat::from_rotation_y(0.1),
+                    offset * unit,
+                ),
+                name: "it".into(),
+            });
+        }
+        let one = SphereSet {
+            spheres: vec![[0.2, 0.1, 0.4, 0.1].map(|x| (x * unit) as f32)],
+        };
+        let one = b.add_spheres(one, "one");
+        b.place(MeshPlacement {
+            shape: one,
+            material: m,
+            world_from_object: DAffine3::IDENTITY,
+            name: "one".into(),
+        });
+        let at = DVec3::new(0.3, 0.4, 1.5) * unit;
+        b.add_light(common::light("point", at, -DVec3::Z, unit * unit));
+        b.add_camera(camera(DVec3::Z * 1.5 * unit, 40.0));
+        agree(&format!("2^{exponent}"), &b.finish().unwrap(), 60_000);
+    }
 }
 
 /// 0.9 s to build both and 2.6 s for 1e6 rays on two cores: kept out of every run.

@@ -33,7 +33,7 @@ enum Fault {
 }
 
 /// Largest coordinate a backend can hold (Embree drops primitives beyond 1.844e18 silently).
-pub(super) const COORDINATE_LIMIT: f32 = 1e18;
+pub(crate) const COORDINATE_LIMIT: f32 = 1e18;
 
 /// An indexed triangle mesh in its own (object) space.
 #[derive(Clone, Debug, Default)]

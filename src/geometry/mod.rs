@@ -22,6 +22,7 @@ pub mod triangle;
 pub use coverage::{Coverage, CoverageQuery, ray_key};
 pub use differential::{Differential, Landing};
 pub use hit::Hit;
+pub(crate) use mesh::COORDINATE_LIMIT;
 pub use mesh::{Invalid, TriangleMesh};
 pub use object::{Geometry, Object, Placement, Shape, SphereSet};
 pub use patch::{Edge, Patches, Walk};

@@ -57,10 +57,14 @@ impl Ray {
         self.d.as_dvec3()
     }
 
-    /// Whether every number in it is usable: finite origin, finite non-zero direction, no NaN
-    /// in the interval. Backends answer "no hit" to any other ray.
+    /// Whether every number in it is usable: finite origin, finite non-zero direction, an interval
+    /// that begins somewhere and holds no NaN. Backends answer "no hit" to any other ray.
     #[inline]
     pub fn is_valid(&self) -> bool {
-        self.o.is_finite() && self.d.is_finite() && self.d != Vec3::ZERO && self.tmin <= self.tmax
+        self.o.is_finite()
+            && self.d.is_finite()
+            && self.d != Vec3::ZERO
+            && self.tmin > f32::NEG_INFINITY
+            && self.tmin <= self.tmax
     }
 }

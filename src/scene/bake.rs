@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::builder::MeshPlacement;
 use crate::geometry::{
-    Geometry, Invalid, Object, Placement, Shape, ShapeId, SphereSet, TriangleMesh,
+    COORDINATE_LIMIT, Geometry, Invalid, Object, Placement, Shape, ShapeId, SphereSet, TriangleMesh,
 };
-use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::math::{Aabb, DAffine3, DMat3, DVec3, Vec3, max_abs};
 
 /// What becomes of one placement.
 enum Task {
@@ -19,8 +19,8 @@ enum Task {
     Copy(usize),
     /// The shape is shared.
     Instance(usize, Placement),
-    /// Nothing of it can be hit; the shape has so many primitives.
-    Flat(usize),
+    /// Nothing of it can be hit: so many primitives, and why.
+    Nothing(Invalid),
 }
 
 /// What became of one placement.
@@ -41,12 +41,20 @@ pub(super) fn bake(
     for p in &placements {
         users[p.shape.index()] += 1;
     }
+    let mut boxes = vec![None; shapes.len()];
     let tasks: Vec<(DAffine3, Task)> = placements
         .iter()
         .map(|p| {
             let mut world = p.world_from_object;
             world.translation -= center;
-            (world, task(&mut shapes, p.shape.index(), &users, &world))
+            let i = p.shape.index();
+            let task = match task(&mut shapes, i, &users, &world) {
+                Task::Instance(_, place) if leaves(&mut boxes[i], &shapes[i], &place) => {
+                    copied(&shapes, i)
+                }
+                task => task,
+            };
+            (world, task)
         })
         .collect();
     let done: Vec<Done> = tasks
@@ -55,13 +63,7 @@ pub(super) fn bake(
             Task::Own(shape) => carry(shape, &world),
             Task::Copy(i) => carry(shapes[i].clone(), &world),
             Task::Instance(i, place) => Done::Instance(i, place),
-            Task::Flat(n) => Done::World(
-                Shape::Spheres(SphereSet::default()),
-                Invalid {
-                    degenerate: n,
-                    ..Default::default()
-                },
-            ),
+            Task::Nothing(why) => Done::World(empty(), why),
         })
         .collect();
     let mut geometry = Geometry::default();
@@ -117,14 +119,43 @@ fn task(shapes: &mut [Shape], i: usize, users: &[usize], world: &DAffine3) -> Ta
             Task::Own(std::mem::replace(&mut shapes[i], empty()))
         }
         (Shape::Spheres(_), Some(place)) => Task::Instance(i, place),
-        (Shape::Spheres(set), None) => Task::Flat(set.spheres.len()),
+        (Shape::Spheres(set), None) => Task::Nothing(flat(set.spheres.len())),
         (Shape::Mesh(_), _) if alone => Task::Own(std::mem::replace(&mut shapes[i], empty())),
         (Shape::Mesh(_), Some(place)) => Task::Instance(i, place),
         // Squashed to a line or a point it has no area: such instances are a way to hide things.
         (Shape::Mesh(m), None) if cofactor(&world.matrix3) == DMat3::ZERO => {
-            Task::Flat(m.indices.len())
+            Task::Nothing(flat(m.indices.len()))
         }
         (Shape::Mesh(_), None) => Task::Copy(i),
+    }
+}
+
+fn flat(degenerate: usize) -> Invalid {
+    Invalid {
+        degenerate,
+        ..Default::default()
+    }
+}
+
+/// Whether part of an instance lies where no backend can hold it; `around` remembers the shape's
+/// box.
+fn leaves(around: &mut Option<Aabb>, shape: &Shape, place: &Placement) -> bool {
+    let limit = f64::from(COORDINATE_LIMIT);
+    let around = around.get_or_insert_with(|| shape.bounds());
+    around
+        .corners_under(&place.world_from_object)
+        .any(|corner| !(max_abs(corner) <= limit))
+}
+
+/// What becomes of such an instance: each of its triangles has its own say once it is carried to
+/// the world, which ellipsoids cannot be.
+fn copied(shapes: &[Shape], i: usize) -> Task {
+    match &shapes[i] {
+        Shape::Mesh(_) => Task::Copy(i),
+        Shape::Spheres(set) => Task::Nothing(Invalid {
+            coordinate: set.spheres.len(),
+            ..Default::default()
+        }),
     }
 }
 

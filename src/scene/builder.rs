@@ -383,6 +383,7 @@ impl SceneBuilder {
             d.scene = scene;
             let light = (self.plugins.lights.find(d.kind)?.build)(&d)
                 .map_err(|e| Error::Usage(format!("light '{}': {e}", d.name)))?;
+            is_measurable(&*light, &d)?;
             if let Some(id) = object {
                 geometry.objects[id.index()].light = Some(LightId(lights.len() as u32));
             }
@@ -391,4 +392,28 @@ impl SceneBuilder {
         }
         Ok((lights, names, geometry))
     }
+}
+
+/// Most radiance in W/(m²·sr) of what has a surface: films sum that of 2³² samples in single
+/// precision.
+const MOST_RADIANCE: f64 = 1e28;
+
+/// Most flux of a light in W: photons carry it in single precision.
+const MOST_FLUX: f64 = 1e38;
+
+/// Whether pictures can show the light.
+fn is_measurable(light: &dyn crate::lights::Light, d: &LightDesc) -> Result<()> {
+    let (radiance, flux) = (d.strength.max_channel(), light.power().max_channel());
+    let radiates = !matches!(d.kind, "point" | "spot" | "directional");
+    let problem = if radiates && !(radiance <= MOST_RADIANCE) {
+        format!("a radiance of {radiance:.1e} W/(m²·sr) is more than {MOST_RADIANCE:.0e}")
+    } else if !(flux <= MOST_FLUX) {
+        format!("a flux of {flux:.1e} W is more than {MOST_FLUX:.0e}")
+    } else {
+        return Ok(());
+    };
+    Err(Error::Usage(format!(
+        "light '{}': {problem}, which single precision cannot sum; make it less bright",
+        d.name
+    )))
 }

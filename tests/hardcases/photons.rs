@@ -66,6 +66,11 @@ pub fn counts(scene: &Scene, seed: u64, photons: u64) -> PhotonCounts {
     trace(scene, seed, photons).global_counts
 }
 
+/// As [`counts`], but photons end at the `depth`-th surface.
+pub fn counts_to(scene: &Scene, seed: u64, photons: u64, depth: u32) -> PhotonCounts {
+    traced(scene, seed, photons, Some(depth), false).global_counts
+}
+
 pub fn p1(row: &mut Row) {
     let mut m = Meter::default();
     let scene = box_scene();

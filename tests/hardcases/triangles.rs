@@ -128,10 +128,11 @@ pub fn t1(row: &mut Row) {
                     .max((sp.barycentrics[1] - e2).abs()),
             );
             fine.see(relative(sp.distance, et));
+            fine.see((sp.p - (ray.origin() + ray.direction() * et)).length());
             fine.see((sp.ng - DVec3::Z).length());
         }
         row.line(name, "own t, u, v in last places of 1", raw, 16.0);
-        row.line(name, "refined t, u, v, normal", fine, 1e-15);
+        row.line(name, "refined t, u, v, place, normal", fine, 1e-15);
     }
     let mut seen = Seen::default();
     for i in 0..256u32 {

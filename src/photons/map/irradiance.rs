@@ -63,7 +63,7 @@ impl IrradianceMap {
                 IrradianceSample {
                     irradiance: e.value.to_f32(),
                     radius: e.radius as f32,
-                    density: e.density as f32,
+                    density: e.density.min(f64::from(f32::MAX)) as f32,
                 }
             })
             .collect();
