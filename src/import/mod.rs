@@ -12,6 +12,7 @@ mod container;
 mod dialect;
 #[cfg(feature = "draco")]
 mod draco;
+mod encoded;
 mod environment;
 mod extras;
 #[cfg(feature = "draco")]
@@ -42,6 +43,7 @@ mod tangents;
 mod texture;
 #[cfg(feature = "meshopt")]
 mod unpacked;
+mod uri;
 mod used;
 mod variants;
 mod vertices;
@@ -229,7 +231,7 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
     }
     let root = Cursor::root(&document.json);
     let source = Source::new(root.clone(), &document.buffers, document.size);
-    let mut images = Images::new(&source, path);
+    let mut images = Images::new(&source, &document.uris);
     fill(
         &root,
         &source,
