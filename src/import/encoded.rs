@@ -16,10 +16,11 @@ use super::buffer::Buffer;
 const BLOCK: usize = 1 << 16;
 
 /// The ways to write base64: what decodes all but the end, and what decodes the end.
-const WAYS: [(&GeneralPurpose, &GeneralPurpose); 3] = [
+const WAYS: [(&GeneralPurpose, &GeneralPurpose); 4] = [
     (&STANDARD_NO_PAD, &STANDARD),
     (&STANDARD_NO_PAD, &STANDARD_NO_PAD),
     (&URL_SAFE_NO_PAD, &URL_SAFE),
+    (&URL_SAFE_NO_PAD, &URL_SAFE_NO_PAD),
 ];
 
 /// Bytes that are in a text as base64.
@@ -55,11 +56,7 @@ impl Encoded {
         Ok(None)
     }
 
-    fn walk(
-        text: &Buffer,
-        range: Range<usize>,
-        way: usize,
-    ) -> io::Result<Option<(Self, u128)>> {
+    fn walk(text: &Buffer, range: Range<usize>, way: usize) -> io::Result<Option<(Self, u128)>> {
         let mut print = Hasher::new();
         let mut out = Self {
             text: text.clone(),
@@ -128,9 +125,7 @@ impl Encoded {
             (some.to_vec(), from.at + to == self.end)
         } else {
             let all = self.text.read(from.at, written)?;
-            let (all, _) = unescape(&all, end == self.end)
-                .ok_or(())
-                .map_err(changed)?;
+            let (all, _) = unescape(&all, end == self.end).ok_or(()).map_err(changed)?;
             let to = wanted.min(all.len());
             let some = all.get(begin..to).ok_or(()).map_err(changed)?;
             (some.to_vec(), end == self.end && to == all.len())

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
-use base64::engine::general_purpose::{STANDARD, STANDARD_NO_PAD, URL_SAFE};
+use base64::engine::general_purpose::{STANDARD, STANDARD_NO_PAD, URL_SAFE, URL_SAFE_NO_PAD};
 
 use super::Problem;
 use super::buffer::{Buffer, Bytes};
@@ -229,10 +229,13 @@ fn decode(uri: &Cursor<'_>) -> Result<Vec<u8>, Problem> {
     if !head.ends_with(";base64") {
         return percent_decode(body).ok_or_else(|| uri.problem("is badly escaped"));
     }
-    STANDARD
-        .decode(body)
-        .or_else(|_| STANDARD_NO_PAD.decode(body))
-        .or_else(|_| URL_SAFE.decode(body))
+    let by = match (body.contains(['-', '_']), body.ends_with('=')) {
+        (false, true) => STANDARD,
+        (false, false) => STANDARD_NO_PAD,
+        (true, true) => URL_SAFE,
+        (true, false) => URL_SAFE_NO_PAD,
+    };
+    by.decode(body)
         .map_err(|e| uri.problem(format!("is not base64 ({e})")))
 }
 
