@@ -34,6 +34,8 @@ mod mesh;
 mod meshopt;
 mod morph;
 mod node;
+#[cfg(any(feature = "draco", feature = "ktx2"))]
+mod quiet;
 mod scenes;
 mod schema;
 mod skin;
