@@ -87,7 +87,11 @@ fn open_json(path: &Path) -> Result<Opened, Problem> {
     let unreadable = |e: io::Error| Problem::file(path, &e);
     let file = Buffer::open(path, true).map_err(unreadable)?;
     let parts = split(&file, path)?;
-    let text = file.part(parts.json.0, parts.json.1);
+    let mut text = file.part(parts.json.0, parts.json.1);
+    if text.len() >= 3 && *text.read(0, 3).map_err(unreadable)? == *b"\xef\xbb\xbf" {
+        // The mark of UTF-8, which some editors write; readers may pass over it (RFC 8259, 8.1).
+        text = text.part(3, text.len() - 3);
+    }
     let (short, uris) = Uris::take(&text, path).map_err(unreadable)?;
     let json = match serde_json::from_slice(&short) {
         Ok(json) => json,

@@ -36,6 +36,7 @@ mod morph;
 mod node;
 #[cfg(any(feature = "draco", feature = "ktx2"))]
 mod quiet;
+mod range;
 mod scenes;
 mod schema;
 mod skin;
@@ -330,6 +331,7 @@ fn fill<'a>(
     for (i, m) in entries.iter().enumerate() {
         let mut desc = material::read(m, images, notes)?;
         ignored::tell(m, root, notes)?;
+        range::of_material(m, notes);
         desc.vertex_colors = colored.contains(&Some(i));
         dialect.apply(&mut desc);
         desc.emission *= radiance;
