@@ -191,6 +191,16 @@ fn broken_files_are_refused_with_their_place() {
             v["cameras"] = json!([{"type": "fisheye"}]);
             v["nodes"][0]["camera"] = json!(0);
         }),
+        ("/cameras/0/perspective/yfov", 1, |v| {
+            v["cameras"] =
+                json!([{"type": "perspective", "perspective": {"yfov": -1, "znear": 1}}]);
+            v["nodes"][0]["camera"] = json!(0);
+        }),
+        ("/cameras/0/orthographic/xmag", 1, |v| {
+            let o = json!({"xmag": 0, "ymag": 1, "znear": 0, "zfar": 1});
+            v["cameras"] = json!([{"type": "orthographic", "orthographic": o}]);
+            v["nodes"][0]["camera"] = json!(0);
+        }),
     ];
     for (place, code, change) in cases {
         let text = triangle(change).to_string();
@@ -209,6 +219,57 @@ fn broken_files_are_refused_with_their_place() {
             );
         }
     }
+}
+
+#[test]
+fn what_is_out_of_range_is_shown_and_told() {
+    let good = triangle(|_| ());
+    let marked = [b"\xef\xbb\xbf", good.to_string().as_bytes()].concat();
+    let (_dir, path) = written(&marked);
+    assert!(read(&path).unwrap().warnings.is_empty());
+
+    let (_dir, path) = written(
+        triangle(|v| {
+            v["meshes"][0]["primitives"][0]["material"] = json!(0);
+            v["materials"] = json!([{
+                "name": "m", "emissiveFactor": [2, -1, 0],
+                "pbrMetallicRoughness": {"roughnessFactor": -3, "metallicFactor": 0.5,
+                    "baseColorTexture": {"index": 0, "texCoord": 7}},
+                "extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 7}},
+            }]);
+            v["textures"] = json!([{"source": 0}]);
+            v["images"] = json!([{"uri": "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAA\
+                AfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg=="}]);
+            let spot = json!({"innerConeAngle": 0.6, "outerConeAngle": 0.5});
+            v["extensions"] = json!({"KHR_lights_punctual": {"lights": [
+                {"type": "spot", "intensity": -5, "spot": spot}]}});
+            v["cameras"] =
+                json!([{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}]);
+            v["nodes"].as_array_mut().unwrap().extend([
+                json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}),
+                json!({"camera": 0, "scale": [1, 0, 1]}),
+            ]);
+            v["scenes"][0]["nodes"] = json!([0, 1, 2]);
+        })
+        .to_string()
+        .as_bytes(),
+    );
+    let scene = read(&path).unwrap();
+    assert!(scene.cameras.is_empty());
+    let lights = "/extensions/KHR_lights_punctual/lights/0";
+    for told in [
+        "/materials/0/emissiveFactor: -1 is out of range and taken for 0",
+        "/materials/0/pbrMetallicRoughness/roughnessFactor: -3 is out of range and taken for 0",
+        "/materials/0/extensions/KHR_materials_clearcoat/clearcoatFactor: 7 is out of range and taken for 1",
+        "material 'm' has textures that need TEXCOORD_7, which /meshes/0/primitives/0 lacks",
+        &format!("{lights}/intensity: -5 is out of range and taken for 0"),
+        &format!("{lights}/spot: the inner cone, 0.6, is wider than the outer one, 0.5"),
+        "cameras whose nodes have a scale of zero",
+    ] {
+        let found = scene.warnings.iter().any(|w| w.contains(told));
+        assert!(found, "{told}: {:#?}", scene.warnings);
+    }
+    assert_eq!(scene.warnings.len(), 7, "{:#?}", scene.warnings);
 }
 
 #[test]

@@ -5,18 +5,31 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Deref;
 use std::path::Path;
-#[cfg(feature = "meshopt")]
 use std::sync::Arc;
 
-/// A run of bytes, in memory or in a file.
-pub(super) enum Buffer {
-    /// Here.
-    Memory(Vec<u8>),
-    /// `len` bytes of a file from `start` on.
+use super::encoded::Encoded;
+
+/// A run of bytes. A copy of it names the same ones.
+#[derive(Clone)]
+pub(super) struct Buffer {
+    data: Data,
+    start: usize,
+    len: usize,
+}
+
+/// Where the bytes are.
+#[derive(Clone)]
+enum Data {
+    Memory(Arc<Vec<u8>>),
     #[cfg(unix)]
-    File { file: File, start: u64, len: usize },
+    File(Arc<File>),
+    /// A file that is open only while it is read, since there are too many of its kind.
+    #[cfg(unix)]
+    Named(Arc<Path>),
+    /// In a text, as base64.
+    Text(Arc<Encoded>),
     /// Nowhere, as the fallback buffers of `EXT_meshopt_compression` may be.
-    Absent { len: usize },
+    Absent,
 }
 
 /// Bytes that were read.
@@ -43,9 +56,38 @@ impl Deref for Bytes<'_> {
     }
 }
 
+impl From<Vec<u8>> for Buffer {
+    fn from(bytes: Vec<u8>) -> Self {
+        Self {
+            start: 0,
+            len: bytes.len(),
+            data: Data::Memory(Arc::new(bytes)),
+        }
+    }
+}
+
+impl From<Encoded> for Buffer {
+    fn from(text: Encoded) -> Self {
+        Self {
+            start: 0,
+            len: text.len(),
+            data: Data::Text(Arc::new(text)),
+        }
+    }
+}
+
 impl Buffer {
-    /// The file at `path`, opened but not read where that is possible.
-    pub(super) fn open(path: &Path) -> io::Result<Self> {
+    /// `len` bytes that are nowhere.
+    pub(super) fn absent(len: usize) -> Self {
+        Self {
+            data: Data::Absent,
+            start: 0,
+            len,
+        }
+    }
+
+    /// The file at `path`, not read where that is possible, and open from now on if it is to `stay` so.
+    pub(super) fn open(path: &Path, stay: bool) -> io::Result<Self> {
         let mut file = File::open(path)?;
         let meta = file.metadata()?;
         if meta.is_dir() {
@@ -55,63 +97,65 @@ impl Buffer {
         if meta.is_file() {
             let len = usize::try_from(meta.len())
                 .map_err(|_| io::Error::from(io::ErrorKind::FileTooLarge))?;
-            return Ok(Self::File {
-                file,
+            return Ok(Self {
+                data: if stay {
+                    Data::File(Arc::new(file))
+                } else {
+                    Data::Named(path.into())
+                },
                 start: 0,
                 len,
             });
         }
+        let _ = stay;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
-        Ok(Self::Memory(bytes))
+        Ok(bytes.into())
     }
 
     /// Number of bytes.
     pub(super) fn len(&self) -> usize {
-        match self {
-            Self::Memory(bytes) => bytes.len(),
-            #[cfg(unix)]
-            Self::File { len, .. } => *len,
-            Self::Absent { len } => *len,
-        }
+        self.len
+    }
+
+    /// Whether its bytes are nowhere.
+    pub(super) fn is_absent(&self) -> bool {
+        matches!(self.data, Data::Absent)
     }
 
     /// `len` bytes from `at` on.
     pub(super) fn read(&self, at: usize, len: usize) -> io::Result<Bytes<'_>> {
         let end = at
             .checked_add(len)
-            .filter(|end| *end <= self.len())
+            .filter(|end| *end <= self.len)
             .ok_or(io::ErrorKind::UnexpectedEof)?;
-        match self {
-            Self::Memory(bytes) => Ok(Bytes::Here(&bytes[at..end])),
+        let (at, end) = (self.start + at, self.start + end);
+        match &self.data {
+            Data::Memory(bytes) => Ok(Bytes::Here(&bytes[at..end])),
             #[cfg(unix)]
-            Self::File { file, start, .. } => {
-                use std::os::unix::fs::FileExt;
-                let mut out = vec![0; len];
-                file.read_exact_at(&mut out, start + at as u64)?;
-                Ok(Bytes::Owned(out))
-            }
-            Self::Absent { .. } => Err(io::ErrorKind::NotFound.into()),
+            Data::File(file) => read_at(file, at, len).map(Bytes::Owned),
+            #[cfg(unix)]
+            Data::Named(path) => read_at(&File::open(path)?, at, len).map(Bytes::Owned),
+            Data::Text(text) => text.read(at, len).map(Bytes::Owned),
+            Data::Absent => Err(io::ErrorKind::NotFound.into()),
         }
     }
 
     /// The part of it that begins at `at` and is `len` bytes long; shorter where it ends before.
-    pub(super) fn part(self, at: usize, len: usize) -> Self {
-        let at = at.min(self.len());
-        let len = len.min(self.len() - at);
-        match self {
-            Self::Memory(mut bytes) => {
-                bytes.truncate(at + len);
-                bytes.drain(..at);
-                Self::Memory(bytes)
-            }
-            #[cfg(unix)]
-            Self::File { file, start, .. } => Self::File {
-                file,
-                start: start + at as u64,
-                len,
-            },
-            Self::Absent { .. } => Self::Absent { len },
+    pub(super) fn part(&self, at: usize, len: usize) -> Self {
+        let at = at.min(self.len);
+        Self {
+            data: self.data.clone(),
+            start: self.start + at,
+            len: len.min(self.len - at),
         }
     }
+}
+
+#[cfg(unix)]
+fn read_at(file: &File, at: usize, len: usize) -> io::Result<Vec<u8>> {
+    use std::os::unix::fs::FileExt;
+    let mut out = vec![0; len];
+    file.read_exact_at(&mut out, at as u64)?;
+    Ok(out)
 }

@@ -1,6 +1,6 @@
 //! Cameras (glTF 2.0, 3.10), and what our extras say about their lenses.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::json::Cursor;
 use super::{Notes, Problem, extras};
@@ -31,11 +31,24 @@ pub(super) fn read(
         "perspective" => {
             let p = c.need("perspective")?;
             let aspect = p.get("aspectRatio").map(|a| a.f64()).transpose()?;
-            ("perspective", p.need("yfov")?.f64()?, aspect)
+            let at = p.need("yfov")?;
+            let yfov = at.f64()?;
+            if !(yfov > 0.0 && yfov < PI) {
+                return Err(at.problem(format!("{yfov} is not an angle between 0 and π")));
+            }
+            ("perspective", yfov, aspect)
         }
         "orthographic" => {
             let o = c.need("orthographic")?;
-            let (x, y) = (o.need("xmag")?.f64()?, o.need("ymag")?.f64()?);
+            let half = |key: &str| {
+                let at = o.need(key)?;
+                let length = at.f64()?;
+                if length > 0.0 {
+                    return Ok(length);
+                }
+                Err(at.problem(format!("{length} is not a length above 0")))
+            };
+            let (x, y) = (half("xmag")?, half("ymag")?);
             ("orthographic", y, Some(x / y))
         }
         other => {

@@ -1,14 +1,13 @@
 //! From bytes to JSON and buffers: `.gltf` with data URIs or files beside it, and `.glb`.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use base64::Engine;
-use base64::engine::general_purpose::{STANDARD, STANDARD_NO_PAD, URL_SAFE};
 use serde_json::Value;
 
 use super::buffer::Buffer;
 use super::json::Cursor;
+use super::uri::Uris;
 use super::views::COMPRESSION;
 use super::{Problem, schema};
 
@@ -16,6 +15,8 @@ use super::{Problem, schema};
 pub(super) struct Document {
     pub(super) json: Value,
     pub(super) buffers: Vec<Buffer>,
+    /// What its URIs hold and name.
+    pub(super) uris: Uris,
     /// Bytes of the file and of all buffers.
     pub(super) size: usize,
 }
@@ -25,16 +26,22 @@ pub(super) fn open(
     path: &Path,
     check: impl FnOnce(&Cursor<'_>) -> Result<(), Problem>,
 ) -> Result<Document, Problem> {
-    let (file, parts, mut json) = open_json(path)?;
+    let Opened {
+        file,
+        parts,
+        uris,
+        mut json,
+    } = open_json(path)?;
     let mut size = file.len();
     let root = Cursor::root(&json);
     check_version(&root)?;
     schema::check(&root)?;
     check(&root)?;
     let mut chunk = parts.binary.map(|(at, len)| file.part(at, len));
+    drop(file);
     let mut buffers = Vec::new();
     for (i, buffer) in root.items("buffers")?.into_iter().enumerate() {
-        let data = read_buffer(&buffer, i, &mut chunk, path)?;
+        let data = read_buffer(&buffer, i, &mut chunk, &uris)?;
         if buffer.get("uri").is_some() {
             size += data.len();
         }
@@ -44,6 +51,7 @@ pub(super) fn open(
     Ok(Document {
         json,
         buffers,
+        uris,
         size,
     })
 }
@@ -62,22 +70,46 @@ fn forget_data(json: &mut Value) {
     }
 }
 
-/// The JSON of the file at `path`, as it stands.
+/// The JSON of the file at `path`. Data in it is left out.
 pub(super) fn json(path: &Path) -> Result<Value, Problem> {
-    open_json(path).map(|(_, _, json)| json)
+    open_json(path).map(|opened| opened.json)
 }
 
-fn open_json(path: &Path) -> Result<(Buffer, Parts, Value), Problem> {
+/// A file whose JSON was read.
+struct Opened {
+    file: Buffer,
+    parts: Parts,
+    uris: Uris,
+    json: Value,
+}
+
+fn open_json(path: &Path) -> Result<Opened, Problem> {
     let unreadable = |e: io::Error| Problem::file(path, &e);
-    let file = Buffer::open(path).map_err(unreadable)?;
+    let file = Buffer::open(path, true).map_err(unreadable)?;
     let parts = split(&file, path)?;
-    let text = file.read(parts.json.0, parts.json.1).map_err(unreadable)?;
-    let json: Value = serde_json::from_slice(&text).map_err(|e| {
-        let place = format!("line {} column {}", e.line(), e.column());
-        Problem::invalid(&place, format!("is not JSON ({e})"))
-    })?;
-    drop(text);
-    Ok((file, parts, json))
+    let mut text = file.part(parts.json.0, parts.json.1);
+    if text.len() >= 3 && *text.read(0, 3).map_err(unreadable)? == *b"\xef\xbb\xbf" {
+        // The mark of UTF-8, which some editors write; readers may pass over it (RFC 8259, 8.1).
+        text = text.part(3, text.len() - 3);
+    }
+    let (short, uris) = Uris::take(&text, path).map_err(unreadable)?;
+    let json = match serde_json::from_slice(&short) {
+        Ok(json) => json,
+        Err(e) => {
+            drop(short);
+            // The place counts what was taken out as well.
+            let whole = text.read(0, text.len()).map_err(unreadable)?;
+            let e = serde_json::from_slice::<Value>(&whole).err().unwrap_or(e);
+            let place = format!("line {} column {}", e.line(), e.column());
+            return Err(Problem::invalid(&place, format!("is not JSON ({e})")));
+        }
+    };
+    Ok(Opened {
+        file,
+        parts,
+        uris,
+        json,
+    })
 }
 
 /// Where the parts of a file are: begin and length.
@@ -183,17 +215,17 @@ fn read_buffer(
     buffer: &Cursor<'_>,
     index: usize,
     chunk: &mut Option<Buffer>,
-    file: &Path,
+    uris: &Uris,
 ) -> Result<Buffer, Problem> {
     let length = buffer.need("byteLength")?.index()?;
     let data = match buffer.get("uri") {
         None => match chunk.take().filter(|_| index == 0) {
             Some(chunk) => chunk,
             // What was compressed may come without the uncompressed bytes.
-            None if is_fallback(buffer) => return Ok(Buffer::Absent { len: length }),
+            None if is_fallback(buffer) => return Ok(Buffer::absent(length)),
             None => return Err(buffer.problem("has neither a URI nor a binary chunk")),
         },
-        Some(uri) => open_uri(&uri, index, file)?,
+        Some(uri) => uris.open(&uri, index)?,
     };
     if data.len() < length {
         return Err(buffer.problem(format!(
@@ -208,74 +240,4 @@ fn read_buffer(
 fn is_fallback(buffer: &Cursor<'_>) -> bool {
     let mut packed = COMPRESSION.iter().filter_map(|name| buffer.extension(name));
     packed.any(|e| e.flag("fallback"))
-}
-
-/// Most buffers whose files stay open.
-const MAX_OPEN: usize = 64;
-
-/// What the URI of buffer `index` holds or names, in a file beside `file`.
-fn open_uri(uri: &Cursor<'_>, index: usize, file: &Path) -> Result<Buffer, Problem> {
-    if uri.str()?.starts_with("data:") || index >= MAX_OPEN {
-        return Ok(Buffer::Memory(read_uri(uri, file)?));
-    }
-    let path = beside(uri, file)?;
-    Buffer::open(&path).map_err(|e| unreadable(uri, &path, &e))
-}
-
-fn unreadable(uri: &Cursor<'_>, path: &Path, e: &io::Error) -> Problem {
-    Problem {
-        remedy: "put it there, or export all as one .glb".into(),
-        ..uri.problem(format!("the file {} cannot be read ({e})", path.display()))
-    }
-}
-
-/// The bytes that a URI holds or names, in a file beside `file`.
-pub(super) fn read_uri(uri: &Cursor<'_>, file: &Path) -> Result<Vec<u8>, Problem> {
-    let text = uri.str()?;
-    if let Some(data) = text.strip_prefix("data:") {
-        let (head, body) = data
-            .split_once(',')
-            .ok_or_else(|| uri.problem("is a data URI without data"))?;
-        if !head.ends_with(";base64") {
-            return percent_decode(body).ok_or_else(|| uri.problem("is badly escaped"));
-        }
-        return STANDARD
-            .decode(body)
-            .or_else(|_| STANDARD_NO_PAD.decode(body))
-            .or_else(|_| URL_SAFE.decode(body))
-            .map_err(|e| uri.problem(format!("is not base64 ({e})")));
-    }
-    let path = beside(uri, file)?;
-    std::fs::read(&path).map_err(|e| unreadable(uri, &path, &e))
-}
-
-/// The path that a URI names, relative to `file`.
-fn beside(uri: &Cursor<'_>, file: &Path) -> Result<PathBuf, Problem> {
-    let text = uri.str()?;
-    if text.contains("://") {
-        return Err(Problem {
-            remedy: "fetch it, and name it by its path".into(),
-            ..uri.problem(format!(
-                "'{text}' is not beside the file; remote files are not read"
-            ))
-        });
-    }
-    let name = percent_decode(text)
-        .and_then(|bytes| String::from_utf8(bytes).ok())
-        .ok_or_else(|| uri.problem("is badly escaped"))?;
-    Ok(file.parent().unwrap_or(Path::new("")).join(&name))
-}
-
-pub(super) fn percent_decode(text: &str) -> Option<Vec<u8>> {
-    let mut out = Vec::with_capacity(text.len());
-    let mut bytes = text.bytes();
-    while let Some(b) = bytes.next() {
-        out.push(if b == b'%' {
-            let digit = |d: u8| char::from(d).to_digit(16);
-            (digit(bytes.next()?)? * 16 + digit(bytes.next()?)?) as u8
-        } else {
-            b
-        });
-    }
-    Some(out)
 }

@@ -9,6 +9,7 @@ use draco_core::{
 
 use super::accessor::{Accessor, Component, Source};
 use super::json::Cursor;
+use super::quiet::quietly;
 use super::{Problem, mesh};
 
 /// A decoded primitive: the attributes that are in it, until they are read.
@@ -54,19 +55,16 @@ pub(super) fn sizes<'p, 'a: 'p>(
 }
 
 /// Does work in a thread of its own. Allocators keep what a thread frees for that thread: so the next
-/// decoder gets what this one had, and not every thread of the pool keeps as much. A decoder of
-/// hostile data that is not ours must not take the program down with it: where it panics, the data is
-/// at fault.
+/// decoder gets what this one had, and not every thread of the pool keeps as much.
 fn apart<T: Send>(
     at: &Cursor<'_>,
     work: impl FnOnce() -> Result<T, Problem> + Send,
 ) -> Result<T, Problem> {
     std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new().spawn_scoped(scope, work);
+        let thread = std::thread::Builder::new().spawn_scoped(scope, || quietly(work));
         let thread = thread.map_err(|e| at.problem(format!("gets no thread ({e})")))?;
-        thread
-            .join()
-            .unwrap_or_else(|_| Err(at.problem("cannot be decoded")))
+        let done = thread.join().ok().flatten();
+        done.unwrap_or_else(|| Err(at.problem("cannot be decoded: its bytes are damaged")))
     })
 }
 

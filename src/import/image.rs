@@ -6,7 +6,6 @@
 
 use std::collections::HashMap;
 use std::io;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -17,7 +16,8 @@ use super::accessor::Source;
 use super::json::Cursor;
 #[cfg(feature = "ktx2")]
 use super::ktx2;
-use super::{Notes, Problem, container};
+use super::uri::Uris;
+use super::{Notes, Problem};
 use crate::textures::{Image, Texels};
 
 /// Most texels of one image: 16384 × 16384.
@@ -51,7 +51,7 @@ enum Bytes<'a> {
 pub(super) struct Images<'a> {
     root: Cursor<'a>,
     source: &'a Source<'a>,
-    file: &'a Path,
+    uris: &'a Uris,
     /// Images that were asked for, by index.
     wanted: HashMap<usize, State>,
     decoded: bool,
@@ -59,12 +59,12 @@ pub(super) struct Images<'a> {
 }
 
 impl<'a> Images<'a> {
-    /// The images of `file`, none of them decoded.
-    pub(super) fn new(source: &'a Source<'a>, file: &'a Path) -> Self {
+    /// The images of a file, none of them decoded.
+    pub(super) fn new(source: &'a Source<'a>, uris: &'a Uris) -> Self {
         Self {
             root: source.root.clone(),
             source,
-            file,
+            uris,
             wanted: HashMap::new(),
             decoded: false,
             placeholder: Arc::new(Image::white()),
@@ -142,7 +142,7 @@ impl<'a> Images<'a> {
 
     fn load(&self, image: &Cursor<'a>, budget: &AtomicU64) -> Result<Option<Image>, Problem> {
         if let Some(uri) = image.get("uri") {
-            return decode(&container::read_uri(&uri, self.file)?, &uri, budget);
+            return decode(&self.uris.read(&uri)?, &uri, budget);
         }
         let view = image.need("bufferView")?;
         decode(&self.source.views.bytes(&view)?, image, budget)

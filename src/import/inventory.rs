@@ -12,6 +12,7 @@ use super::buffer::Bytes;
 use super::container;
 use super::image;
 use super::json::Cursor;
+use super::uri::Uris;
 use super::{Problem, SUPPORTED};
 use crate::error::Result;
 
@@ -135,7 +136,7 @@ fn tell(path: &Path) -> Result<Inventory, Problem> {
     }
     let mut images = Vec::new();
     for i in root.items("images")? {
-        images.push(picture(&i, &source, path));
+        images.push(picture(&i, &source, &document.uris));
     }
     Ok(Inventory {
         generator: generator.and_then(|g| g.str().ok().map(str::to_owned)),
@@ -231,7 +232,7 @@ fn slots(v: &Value, out: &mut Vec<String>) {
 
 /// An image, told by its header. One that cannot be read is told as such: whether it matters is
 /// another question.
-fn picture<'a>(i: &Cursor<'a>, source: &Source<'a>, path: &Path) -> ImageInfo {
+fn picture<'a>(i: &Cursor<'a>, source: &Source<'a>, uris: &Uris) -> ImageInfo {
     let mut out = ImageInfo {
         name: title(i),
         format: "unknown",
@@ -240,7 +241,7 @@ fn picture<'a>(i: &Cursor<'a>, source: &Source<'a>, path: &Path) -> ImageInfo {
         problem: None,
     };
     let bytes = match (i.get("uri"), i.get("bufferView")) {
-        (Some(uri), _) => container::read_uri(&uri, path).map(Bytes::Owned),
+        (Some(uri), _) => uris.read(&uri).map(Bytes::Owned),
         (None, Some(view)) => source.views.bytes(&view),
         (None, None) => Err(i.problem("has neither a URI nor a buffer view")),
     };

@@ -4,10 +4,10 @@
 //! Source: Khronos Group, *KTX File Format Specification*, version 2.0.
 
 use std::io::Read;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use basisu::{DecodeFlags, TargetFormat, Transcoder};
 
+use super::quiet::quietly;
 use crate::textures::{Image, Texels};
 
 const MAGIC: [u8; 12] = *b"\xABKTX 20\xBB\r\n\x1A\n";
@@ -127,15 +127,14 @@ impl<'a> Ktx2<'a> {
         // The key-value data is not needed and its bounds are not checked by the transcoder.
         let mut bytes = self.bytes.to_vec();
         bytes[56..64].fill(0);
-        // A decoder of hostile data that is not ours must not take the program down with it.
-        let decoded = catch_unwind(AssertUnwindSafe(|| {
+        let decoded = quietly(|| {
             Transcoder::new(&bytes)?.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE)
-        }));
+        });
         match decoded {
-            Ok(Ok(texels)) => Ok(texels),
-            Ok(Err(basisu::Error::Unsupported { .. })) => Err(Fault::Foreign),
-            Ok(Err(e)) => Err(broken(format!("cannot be transcoded ({e:?})"))),
-            Err(_) => Err(broken("cannot be transcoded")),
+            Some(Ok(texels)) => Ok(texels),
+            Some(Err(basisu::Error::Unsupported { .. })) => Err(Fault::Foreign),
+            Some(Err(e)) => Err(broken(format!("cannot be transcoded ({e:?})"))),
+            None => Err(broken("cannot be transcoded: its bytes are damaged")),
         }
     }
 

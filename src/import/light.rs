@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use super::dialect::{self, Dialect};
 use super::json::Cursor;
 use super::node::Walker;
-use super::{Notes, Problem, extras};
+use super::{Notes, Problem, extras, range};
 use crate::color::Rgb;
 use crate::color::units::{self, LightUnits};
 use crate::lights::LightDesc;
@@ -86,6 +86,7 @@ pub(super) fn read(
             return Err(kind.problem(text));
         }
     };
+    range::of_light(light, walker.notes);
     let names: &[&str] = if kind == "directional" {
         &["angle", "seen_by_camera"]
     } else {
@@ -117,12 +118,12 @@ pub(super) fn read(
             .add("spot lights whose cone is closed shine nowhere", 1);
         scale = 0.0;
     }
-    let range = match light.get("range") {
+    let reach = match light.get("range") {
         Some(r) if kind != "directional" && walker.lamps.has_ranges() => r.f64()?,
         _ => f64::INFINITY,
     };
-    if !(range > 0.0) {
-        return Err(light.problem(format!("range {range} is not positive")));
+    if !(reach > 0.0) {
+        return Err(light.problem(format!("range {reach} is not positive")));
     }
     Ok(LightDesc {
         kind,
@@ -135,7 +136,7 @@ pub(super) fn read(
         inner_cone: angle("innerConeAngle", 0.0)?.clamp(0.0, outer),
         outer_cone: outer,
         spot_curve: walker.lamps.spot_curve(),
-        range,
+        range: reach,
         radius: extent.radius,
         angular_radius: 0.5 * extent.angle,
         seen_by_camera: extent.seen_by_camera,

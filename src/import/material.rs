@@ -62,7 +62,7 @@ pub(super) fn read<'a>(
 ) -> Result<MaterialDesc, Problem> {
     let mut out = MaterialDesc {
         name: m.name(),
-        emission: rgb(m.numbers_or("emissiveFactor", [0.0; 3])?),
+        emission: color(m, "emissiveFactor", [0.0; 3])?,
         double_sided: m.flag("doubleSided"),
         extras: m
             .get("extras")
@@ -146,7 +146,7 @@ fn specular_glossiness<'a>(
     };
     base_color(out, &e, "diffuseFactor")?;
     out.metallic = 0.0;
-    out.specular_reflectance = Some(rgb(e.numbers_or("specularFactor", [1.0; 3])?));
+    out.specular_reflectance = Some(color(&e, "specularFactor", [1.0; 3])?.map(|x| x.min(1.0)));
     out.roughness = 1.0 - unit(&e, "glossinessFactor", 1.0)?;
     slots.found.base_color = None;
     slots.found.metallic_roughness = None;

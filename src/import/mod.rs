@@ -12,6 +12,7 @@ mod container;
 mod dialect;
 #[cfg(feature = "draco")]
 mod draco;
+mod encoded;
 mod environment;
 mod extras;
 #[cfg(feature = "draco")]
@@ -33,6 +34,9 @@ mod mesh;
 mod meshopt;
 mod morph;
 mod node;
+#[cfg(any(feature = "draco", feature = "ktx2"))]
+mod quiet;
+mod range;
 mod scenes;
 mod schema;
 mod skin;
@@ -42,6 +46,7 @@ mod tangents;
 mod texture;
 #[cfg(feature = "meshopt")]
 mod unpacked;
+mod uri;
 mod used;
 mod variants;
 mod vertices;
@@ -229,7 +234,7 @@ pub fn load(path: &Path, options: &ImportOptions, plugins: ScenePlugins) -> Resu
     }
     let root = Cursor::root(&document.json);
     let source = Source::new(root.clone(), &document.buffers, document.size);
-    let mut images = Images::new(&source, path);
+    let mut images = Images::new(&source, &document.uris);
     fill(
         &root,
         &source,
@@ -326,6 +331,7 @@ fn fill<'a>(
     for (i, m) in entries.iter().enumerate() {
         let mut desc = material::read(m, images, notes)?;
         ignored::tell(m, root, notes)?;
+        range::of_material(m, notes);
         desc.vertex_colors = colored.contains(&Some(i));
         dialect.apply(&mut desc);
         desc.emission *= radiance;

@@ -19,7 +19,8 @@ use super::skin::Skin;
 #[cfg(feature = "meshopt")]
 use super::unpacked::Users;
 use super::{
-    Notes, Problem, camera, implicit, instancing, light, mesh, morph, solid, tangents, variants,
+    Notes, Problem, camera, implicit, instancing, light, mesh, morph, range, solid, tangents,
+    variants,
 };
 use crate::color::units::LightUnits;
 use crate::geometry::{MaterialId, ShapeId};
@@ -179,6 +180,15 @@ impl<'a> Walker<'a, '_> {
         if let Some(at) = node.get("camera") {
             let camera = self.source.root.element("cameras", at.index()?, &at)?;
             let desc = camera::read(&camera, node.name(), world, self.notes)?;
+            let m = world.matrix3;
+            if [m.x_axis, m.y_axis, m.z_axis]
+                .iter()
+                .any(|a| a.try_normalize().is_none())
+            {
+                let what = "cameras whose nodes have a scale of zero look nowhere and are left out";
+                self.notes.add(what, 1);
+                return Ok(());
+            }
             self.builder.add_camera(desc);
         }
         Ok(())
@@ -241,7 +251,7 @@ impl<'a> Walker<'a, '_> {
     }
 
     /// Lists the primitives of all posed meshes, equal ones once.
-    fn jobs(&self, posed: &mut [Posed<'a>]) -> Result<Vec<Job<'a>>, Problem> {
+    fn jobs(&mut self, posed: &mut [Posed<'a>]) -> Result<Vec<Job<'a>>, Problem> {
         let mut jobs: Vec<Job<'a>> = Vec::new();
         let mut known: HashMap<String, usize> = HashMap::new();
         for (i, m) in posed.iter_mut().enumerate() {
@@ -258,6 +268,7 @@ impl<'a> Walker<'a, '_> {
                     None => None,
                     Some(m) => {
                         let m = self.source.root.element("materials", m.index()?, m)?;
+                        range::of_coordinates(&p, &m, self.notes);
                         tangents::wanted(&m)?
                     }
                 };

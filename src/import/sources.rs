@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::container::{self, percent_decode};
-use super::{EnvironmentSource, ImportOptions};
+use super::uri::percent_decode;
+use super::{EnvironmentSource, ImportOptions, container};
 use crate::error::Result;
 
 /// The file at `path` and all files that it names and that are there: buffers, images, skies; and

@@ -102,7 +102,9 @@ impl<'a> Views<'a> {
             });
         }
         let view = self.range(at, stride)?;
-        if let (Some(e), Data::Plain(Buffer::Absent { .. }, _)) = (packed, &view.data) {
+        if let (Some(e), Data::Plain(buffer, _)) = (packed, &view.data)
+            && buffer.is_absent()
+        {
             return Err(Problem::unsupported(
                 e.path(),
                 "is compressed, which this build cannot read",

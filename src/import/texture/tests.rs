@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::super::accessor::Source;
 use super::super::buffer::Buffer;
+use super::super::uri::Uris;
 use super::*;
 use crate::textures::Image;
 
@@ -47,9 +48,10 @@ fn load_beside(
     path: &std::path::Path,
 ) -> Result<Option<Texture>, Problem> {
     let root = Cursor::root(json);
-    let buffers: Vec<Buffer> = buffers.iter().cloned().map(Buffer::Memory).collect();
+    let buffers: Vec<Buffer> = buffers.iter().cloned().map(Buffer::from).collect();
     let source = Source::new(root.clone(), &buffers, 0);
-    let mut images = Images::new(&source, path);
+    let uris = Uris::of(path);
+    let mut images = Images::new(&source, &uris);
     let info = root.need("info")?;
     read(&info, Content::Color, &mut images, &mut Notes::default())?;
     images.decode()?;
@@ -117,7 +119,8 @@ fn an_image_is_decoded_once_however_often_it_is_named() {
     });
     let root = Cursor::root(&json);
     let source = Source::new(root.clone(), &[], 0);
-    let mut images = Images::new(&source, std::path::Path::new("scene.gltf"));
+    let uris = Uris::of(std::path::Path::new("scene.gltf"));
+    let mut images = Images::new(&source, &uris);
     let info = |key: &str| root.need(key).unwrap();
     let (notes, color) = (&mut Notes::default(), Content::Color);
     for key in ["a", "b"] {
