@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use crate::stats::PhotonCounts;
 
 /// Raised when the same scene and settings would give other photons than before.
-const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ".4");
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ".5");
 
 /// All that decides what the maps hold: photons of the same key are the same to the bit on the same
 /// kind of machine. The camera is not in it.

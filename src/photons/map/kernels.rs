@@ -86,7 +86,10 @@ impl<'a> Kernel<'a> {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Decision {
     ng: PackedNormal,
+    /// Radius of a kernel that knows nothing more.
     radius: f32,
+    /// How far around the site light is even: kernels within are as wide as they can be there.
+    even: f32,
     /// Index of its clearing; [`OPEN`] or [`BENT`] if there is none.
     clearing: u32,
 }
@@ -170,9 +173,11 @@ impl Pilot<'_> {
                         p: Vec3::from(photon.p),
                         ng: photon.ng(),
                     };
-                    let near = map.spread(&site, photon, EVEN, &mut found, &mut last2);
-                    let radius = (f64::from(near) * scale) as f32;
-                    let radius = radius.clamp(super::LEAST * widest, widest);
+                    let [near, far] = map.spread(&site, photon, EVEN, &mut found, &mut last2);
+                    let [radius, even] = [near, far].map(|near| {
+                        let radius = (f64::from(near) * scale) as f32;
+                        radius.clamp(super::LEAST * widest, widest)
+                    });
                     // Photons in one place need to be counted once only.
                     let apart = THINNING * radius;
                     if part.last().is_some_and(|(p, last, _)| {
@@ -180,10 +185,15 @@ impl Pilot<'_> {
                     }) {
                         continue;
                     }
-                    let seen = self.around.look(&site, radius);
+                    let wide = (even > radius).then(|| self.around.look(&site, even));
+                    let (even, seen) = match wide {
+                        Some(seen @ Seen::Flat) => (even, seen),
+                        _ => (radius, self.around.look(&site, radius)),
+                    };
                     let decision = Decision {
                         ng: photon.packed_ng(),
                         radius,
+                        even,
                         clearing: OPEN,
                     };
                     part.push((site.p, decision, seen));
@@ -256,10 +266,21 @@ impl Kernels {
     pub fn at(&self, i: usize) -> Kernel<'_> {
         let decision = &self.decisions[i];
         if decision.clearing == OPEN {
-            return Kernel::disc(decision.radius);
+            return Kernel::disc(decision.even);
         }
         let clearing = self.clearings.get(decision.clearing as usize);
         Kernel::on_ground(&self.site(i), decision.radius, clearing)
+    }
+
+    /// The same for a point that it serves: no wider than lies in what was found even.
+    pub(super) fn beside(&self, i: usize, p: Vec3) -> Kernel<'_> {
+        let (kernel, decision) = (self.at(i), &self.decisions[i]);
+        Kernel {
+            radius: decision
+                .radius
+                .max(kernel.radius - self.tree.position(i).distance(p)),
+            ..kernel
+        }
     }
 
     /// The nearest site on the same side of the same surface that has looked at what lies around

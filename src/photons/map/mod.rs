@@ -164,8 +164,8 @@ impl PhotonMap {
         self.kernels.as_ref()
     }
 
-    /// Distance to the farthest of the wanted number of photons around a site, of up to `times` as many
-    /// where they lie evenly, or as far as is searched. Those that have no channel in common with `like`
+    /// Distance to the farthest of the wanted number of photons around a site, or as far as is searched, and
+    /// how far around they lie evenly, of up to `times` as many. Those that have no channel in common with `like`
     /// are others. `last2` is from call to call the squared distance that was last searched up to, which
     /// makes searches short where sites follow their neighbours.
     fn spread(
@@ -175,7 +175,7 @@ impl PhotonMap {
         times: usize,
         found: &mut Nearest,
         last2: &mut f32,
-    ) -> f32 {
+    ) -> [f32; 2] {
         let side = Side::new(site);
         let search = |found: &mut Nearest, k: usize, max2: f32| {
             found.reset(k, max2);
@@ -191,9 +191,10 @@ impl PhotonMap {
             search(found, k, max2);
         }
         *last2 = found.kernel().1;
-        let Some(mut widest2) = found.nth(self.nearest) else {
-            return self.max_radius;
+        let Some(near2) = found.nth(self.nearest) else {
+            return [self.max_radius; 2];
         };
+        let mut widest2 = near2;
         let frame = site.ng.any_orthonormal_pair().into();
         while k > self.nearest {
             let (enough, rim) = found.kernel();
@@ -210,7 +211,7 @@ impl PhotonMap {
             k *= 2;
             search(found, k, (bandwidth::FARTHEST * widest2).min(max2));
         }
-        widest2.sqrt()
+        [near2, widest2].map(f32::sqrt)
     }
 
     /// Number of photons.
@@ -244,7 +245,7 @@ impl PhotonMap {
             return self.estimate_nearest(site, found, keep, f);
         };
         if let Some(i) = kernels.nearest(site) {
-            return self.estimate_within(site, kernels.at(i), keep, f);
+            return self.estimate_within(site, kernels.beside(i, site.p), keep, f);
         }
         // In the dark, or in a nook: only if there are photons, their surroundings are looked at.
         let radius = kernels.radius(site);
