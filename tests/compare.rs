@@ -458,6 +458,7 @@ fn reports_are_one_line_or_json_and_their_worst_rays_can_be_asked_again() {
             "two different",
         ),
         ("compare s.glb --accel magic", 2, "known:"),
+        ("compare s.glb --rays 0", 2, "at least 1"),
         ("compare s.glb --replay missing.json", 1, "missing.json"),
         ("compare s.glb --replay s.glb", 1, "--json=FILE"),
         ("compare s.glb --json=missing/r.json", 1, "create it"),

@@ -327,7 +327,7 @@ pub struct CompareArgs {
     #[allow(missing_docs, reason = "clap would show it as the help of the command")]
     pub scene: SceneArgs,
     /// Rays in all: camera, shadow, photon, bounced, random, and aimed at edges; 10M is understood
-    #[arg(long, value_name = "N", default_value = "1M", value_parser = values::count)]
+    #[arg(long, value_name = "N", default_value = "1M", value_parser = values::positive)]
     pub rays: u64,
     /// Backend to judge [default: the first of dualight plugins]
     #[arg(long, value_name = "NAME")]
