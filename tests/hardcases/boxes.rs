@@ -143,49 +143,66 @@ pub fn b3(row: &mut Row) {
 /// Last places from which on Embree tells on which side of an end a hit lies.
 const ROUNDED_ENDS: u32 = 4;
 
+/// Distances with and without a short reciprocal, that single precision holds.
+const ENDS: [f32; 7] = [2.0, 3.0, 7.0, 0.1, 1e-3, 12345.678, 3e5];
+
 pub fn b4(row: &mut Row) {
-    let o = DVec3::new(0.25, 0.125, -2.0);
+    let ahead = |t: f32| DVec3::Z * -f64::from(t);
+    let ball = |z: f64| spheres(&[(DVec3::Z * z, 1.0)]);
+    let plane = mesh(plane(1, DVec3::ZERO, 2.0));
+    let aside = DVec3::new(0.25, 0.125, 0.0);
+    // Where a sphere's poles are is exact at these.
+    let whole = || ENDS.into_iter().filter(|t| t.fract() == 0.0 && *t < 10.0);
+    let at = |list: Vec<f32>| {
+        let list: Vec<String> = list.iter().map(f32::to_string).collect();
+        list.join(", ")
+    };
     let bodies = [
         (
-            "a triangle at distance 2",
-            mesh(plane(1, DVec3::ZERO, 2.0)),
-            o,
-            2.0f32,
+            format!("a triangle at distances {}", at(ENDS.to_vec())),
+            plane,
+            aside,
+            ENDS.to_vec(),
         ),
         (
-            "a sphere entered at distance 2",
-            spheres(&[(DVec3::Z, 1.0)]),
-            DVec3::Z * -2.0,
-            2.0,
+            format!("a sphere entered at distances {}", at(whole().collect())),
+            ball(1.0),
+            DVec3::ZERO,
+            whole().collect(),
         ),
         (
-            "a sphere left at distance 2",
-            spheres(&[(DVec3::NEG_Z, 1.0)]),
-            DVec3::Z * -2.0,
-            2.0,
+            format!("a sphere left at distances {}", at(whole().collect())),
+            ball(-1.0),
+            DVec3::ZERO,
+            whole().collect(),
         ),
     ];
-    for (tried, g, o, t) in bodies {
+    for (tried, g, aside, distances) in bodies {
         row.tried(tried);
-        // What the ray meets else lies nearer than 1, and beyond 3.
         for (name, accel) in backends(&g) {
             let ask = |ulps: u32| {
-                let step = |f: fn(f32) -> f32| (0..ulps).fold(t, |t, _| f(t));
-                let (before, after) = (step(f32::next_down), step(f32::next_up));
                 let mut m = Meter::default();
-                for (tmin, tmax, want) in [
-                    (before, 3.0, true),
-                    (1.0, after, true),
-                    (before, after, true),
-                    (after.next_up(), 3.0, false),
-                    (1.0, before.next_down(), false),
-                ] {
-                    let ray = Ray {
-                        tmin,
-                        tmax,
-                        ..Ray::new(o, DVec3::Z)
-                    };
-                    m.must(accel.intersect(&ray).is_some() == want && accel.occluded(&ray) == want);
+                for t in &distances {
+                    let step = |f: fn(f32) -> f32| (0..ulps).fold(*t, |t, _| f(t));
+                    let (before, after) = (step(f32::next_down), step(f32::next_up));
+                    // A sphere's other side lies 2 away.
+                    let (near, far) = ((t - 1.0).max(0.5 * t), t + t.min(1.0));
+                    for (tmin, tmax, want) in [
+                        (before, far, true),
+                        (near, after, true),
+                        (before, after, true),
+                        (after.next_up(), far, false),
+                        (near, before.next_down(), false),
+                    ] {
+                        let ray = Ray {
+                            tmin,
+                            tmax,
+                            ..Ray::new(aside + ahead(*t), DVec3::Z)
+                        };
+                        m.must(
+                            accel.intersect(&ray).is_some() == want && accel.occluded(&ray) == want,
+                        );
+                    }
                 }
                 m
             };

@@ -1,7 +1,8 @@
 //! Rows D1 to D6, D9 and D10: derivatives, by a scalar of the tests' own.
 
+use dualight::accel::ACCELERATORS;
 use dualight::ad::{Real, V3};
-use dualight::geometry::{sphere, triangle};
+use dualight::geometry::{Ray, ScenePatches, sphere, triangle};
 use dualight::math::{DQuat, DVec3};
 use dualight::sampling::{Rng, hash2};
 use rayon::prelude::*;
@@ -10,7 +11,7 @@ use crate::dual::{Dual, by, variables};
 use crate::exact::{ExactSphere, Q, V};
 use crate::flushed::Flushed;
 use crate::report::{MEASURED, Meter, Row, cases};
-use crate::scenes::{in_cube, on_sphere};
+use crate::scenes::{in_cube, on_sphere, spheres};
 
 fn discriminant(o: DVec3, d: DVec3, c: DVec3, r: f64) -> Dual {
     let [vo, vd] = variables(o, d);
@@ -330,6 +331,36 @@ pub fn d6(row: &mut Row) {
         m,
         1e-6,
     );
+    row.tried("rays from either side of a sphere's surface, down to 1e-6 r from it; seed 61");
+    row.line(
+        "emission",
+        "the root switches, and what is met counts as the same",
+        switches(),
+        0.0,
+    );
+}
+
+/// Rays along one line from just outside and from just inside a sphere: near root and far root. A cell of
+/// an emission is divided where its rays meet different things.
+fn switches() -> Meter {
+    let g = spheres(&[(DVec3::ZERO, 1.0)]);
+    let accel = (ACCELERATORS[0].build)(&g, 1).unwrap();
+    let patches = ScenePatches::new(&g);
+    let mut m = Meter::default();
+    let mut rng = Rng::new(61);
+    for i in 0..3000 {
+        let p = on_sphere(&mut rng);
+        let d = (on_sphere(&mut rng) * 0.9 - p).normalize();
+        let off = 10f64.powi(-1 - i % 6);
+        let met = [p * (1.0 + off), p * (1.0 - off)].map(|o| {
+            let ray = Ray::new(o, d);
+            let hit = accel.intersect(&ray)?;
+            Some(patches.id(&g, ray.origin(), ray.direction(), &hit))
+        });
+        // The one that misses is another thing as well.
+        m.must(met[0] != met[1] && met[1].is_some());
+    }
+    m
 }
 
 /// Angle at which parallel light with impact parameter `b` leaves a glass sphere, twice
