@@ -1,12 +1,10 @@
-//! `dualight compare`: backends agree or say why, every sabotage is found, and what is reported
-//! can be asked again.
+//! What `dualight compare` finds: backends agree or say why, and every sabotage is found.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 #![cfg(feature = "embree")]
 
 mod common;
 
 use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 
 use common::{add_sphere, camera, lambert};
@@ -21,7 +19,7 @@ use dualight::materials::{AlphaMode, MaterialDesc};
 use dualight::math::{DAffine3, DQuat, DVec3};
 use dualight::photons::{EMISSIONS, EmissionContext, Purpose};
 use dualight::report::agreement::{self, Agreement};
-use dualight::report::rays::{RayKind, RayMaker};
+use dualight::report::rays::RayMaker;
 use dualight::sampling::Rng;
 use dualight::scene::{MeshPlacement, Scene, SceneBuilder};
 
@@ -394,82 +392,6 @@ fn every_sabotage_is_found() {
         assert!(out.total().unexplained > 50, "{name}: {:?}", out.total());
         assert_eq!(out.worst[0].finding.class, Class::Unexplained, "{name}");
         assert!(out.worst[0].finding.ratio > 1.0, "{name}");
-    }
-}
-
-fn run(directory: &Path, line: &str) -> (Option<i32>, String, String) {
-    let out = Command::new(env!("CARGO_BIN_EXE_dualight"))
-        .args(line.split_whitespace())
-        .current_dir(directory)
-        .output()
-        .unwrap();
-    let text = |v| String::from_utf8(v).unwrap();
-    (out.status.code(), text(out.stdout), text(out.stderr))
-}
-
-#[test]
-fn reports_are_one_line_or_json_and_their_worst_rays_can_be_asked_again() {
-    let directory = tempfile::tempdir().unwrap();
-    let d = directory.path();
-    let scene = Path::new("scenes/box_mesh.glb").canonicalize().unwrap();
-    std::fs::copy(scene, d.join("s.glb")).unwrap();
-    let (status, out, err) = run(
-        d,
-        "compare s.glb -q --rays 60k --worst 7 --spp 1 --size 16x16",
-    );
-    assert_eq!((status, err.as_str()), (Some(0), ""));
-    let last = out.lines().last().unwrap();
-    for part in [
-        "s.glb",
-        "embree against bvh",
-        "60.0k rays",
-        "0 unexplained",
-        "relMSE",
-    ] {
-        assert!(last.contains(part), "{part}: {out}");
-    }
-    let line = "compare s.glb -q --rays 60k --worst 7 --spp 0 --json=r.json";
-    let (status, out, _) = run(d, line);
-    assert_eq!((status, out.as_str()), (Some(0), ""));
-    let read = |name| -> serde_json::Value {
-        serde_json::from_slice(&std::fs::read(d.join(name)).unwrap()).unwrap()
-    };
-    let first = read("r.json");
-    assert_eq!(first["worst"].as_array().unwrap().len(), 7);
-    assert!(first["images"].is_null() && first["total"]["unexplained"] == 0);
-    assert_eq!(
-        first["kinds"].as_object().unwrap().len(),
-        RayKind::ALL.len()
-    );
-    // The same rays bring the same answers, to the bit.
-    let (status, _, _) = run(d, "compare s.glb -q --replay r.json --json=again.json");
-    assert_eq!(status, Some(0));
-    assert_eq!(first["worst"], read("again.json")["worst"]);
-    let (_, out, _) = run(d, "compare s.glb -q --replay r.json");
-    assert_eq!(
-        out.lines().filter(|l| l.contains("of the bound")).count(),
-        7
-    );
-
-    for (line, status, part) in [
-        (
-            "compare s.glb --accel bvh --reference bvh",
-            2,
-            "two different",
-        ),
-        ("compare s.glb --accel magic", 2, "known:"),
-        ("compare s.glb --rays 0", 2, "at least 1"),
-        ("compare s.glb --replay missing.json", 1, "missing.json"),
-        ("compare s.glb --replay s.glb", 1, "--json=FILE"),
-        ("compare s.glb --json=missing/r.json", 1, "create it"),
-        ("compare s.glb --replay r.json --rays 5", 2, "--replay"),
-    ] {
-        let (code, out, err) = run(d, line);
-        assert_eq!(code, Some(status), "{line}: {err}");
-        assert!(
-            out.is_empty() && err.lines().count() == 1 && err.contains(part),
-            "{line}: {err}"
-        );
     }
 }
 

@@ -6,7 +6,7 @@ mod common;
 
 use std::collections::BTreeMap;
 
-use common::render::{DIRECT_MAP, GATHER, Mode, PATH, Size, rendering, settings};
+use common::render::{DIRECT_MAP, GATHER, HYBRID, PATH, Size, rendering, settings};
 use common::show::{Show, scene};
 use dualight::effects::{Acts, EFFECTS, omissions};
 use dualight::pipeline::Rendering;
@@ -17,12 +17,6 @@ const SIZE: Size = Size {
     pixels: 24,
     spp: 4,
     photons: 2000,
-};
-
-const HYBRID: Mode = Mode {
-    name: "hybrid",
-    integrator: "hybrid",
-    gather_rays: 0,
 };
 
 /// All counts by effect.

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use common::render::{DIRECT_MAP, GATHER, Mode, Size, settings, with_photons as render};
+use common::render::{DIRECT_MAP, GATHER, HYBRID, Size, settings, with_photons as render};
 use common::{add_sphere, box_scene, camera, glass, lambert, light, square};
 use dualight::color::Rgb;
 use dualight::film::Image;
@@ -24,12 +24,6 @@ const SIZE: Size = Size {
     pixels: 16,
     spp: 20,
     photons: 8000,
-};
-
-const HYBRID: Mode = Mode {
-    name: "hybrid",
-    integrator: "hybrid",
-    gather_rays: 0,
 };
 
 fn save(path: &Path) -> Option<PhotonFile> {

@@ -6,6 +6,7 @@
 )]
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
+pub mod changed;
 pub mod chi2;
 pub mod oracle;
 pub mod photons;

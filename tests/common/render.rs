@@ -34,6 +34,11 @@ pub const DIRECT_MAP: Mode = Mode {
     integrator: "photon",
     gather_rays: 0,
 };
+pub const HYBRID: Mode = Mode {
+    name: "hybrid",
+    integrator: "hybrid",
+    gather_rays: 0,
+};
 pub const MODES: [Mode; 3] = [PATH, GATHER, DIRECT_MAP];
 
 /// Names of the ray tracing backends.
